@@ -185,8 +185,8 @@ def regulation_page(folder: Path) -> Chapter:
 
     wish = RegulationRequest(draws=16, seconds=2.0)
     known = completed(identify_make("linear", 1, folder))
-    told = Rising()
-    return chapter(run_regulation(known, TwinStand(rig=make_rig("linear", 1)), 1, folder, told, wish=wish))
+    stand = TwinStand(rig=make_rig("linear", 1))
+    return chapter(run_regulation(known, stand, 1, folder, Rising(), request=wish))
 
 
 def swing_up_page(folder: Path) -> Chapter:

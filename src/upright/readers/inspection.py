@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from upright import units
 from upright.errors import BadInput, nearest
-from upright.readers.resolution import Resolution, resolution_of, rounding
+from upright.readers.resolution import Resolution, counts_per_rev, resolution_of, rounding
 from upright.records import Array, Record
 from upright.signals.stretches import stretches
 
@@ -159,8 +159,9 @@ def _column(record: Record, name: str) -> Column:
     guess = unit or ("1" if sample_index(x) else effort_unit(name) or _guess_unit(name, x, step))
     constant = low == high
     drive = _is_drive(name, x, guess)
-    if step.counts_per_rev and guess != "rad":
-        step = Resolution(step=step.step, decimals=step.decimals)
+    turn = {"rad": 1.0, "deg": math.pi / 180}.get(guess, 0.0)
+    exact = turn and step.step and not step.decimals
+    step = replace(step, counts_per_rev=counts_per_rev(turn * step.step) if exact else 0)
     return Column(
         name=name,
         unit=unit,

@@ -22,7 +22,7 @@ from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
 from upright.study.draft.chain_log import ChainLog
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised, swing_frequency
+from upright.study.draft.recognise import Recognised, in_dac_counts, swing_frequency
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -125,7 +125,7 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts
     if drive is not None:
         scale = _volts(drive)[1]
         u = record[drive.name][rows] * (-scale if log.recognised.reversed else scale)
-        reach = REACH if scale != 1.0 else np.inf
+        reach = REACH if drive.guess == "counts" or in_dac_counts(drive) else np.inf
     return starts(
         record.t[rows],
         u,
@@ -205,10 +205,10 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
 def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
     counts, whose = log.counts[coordinate.unit]
-    told = f"{whose}; what is said in V, s and counts does not depend on it"
+    sentence = f"{whose}; what is said in V, s and counts does not depend on it"
     driven = log.recognised.drive is not None
     return sensor_table(
-        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, told), driven=driven
+        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, sentence), driven=driven
     )
 
 
