@@ -158,7 +158,7 @@ def test_poles_of_sampled_matrices_are_those_whose_motion_outlasts_a_third_of_a_
 def test_the_converter_of_the_drive_goes_into_the_file_and_none_where_nobody_named_one(done):
     assert chapter(done).numbers["converter"] == 0.0
     on = replace(ARM.replace(converter=0.005), basis=MEASURED)
-    known = replace(done, wish=replace(done.wish, on=on))
+    known = replace(done, request=replace(done.request, on=on))
     assert chapter(known).numbers["converter"] == 0.005
 
 

@@ -84,9 +84,9 @@ def test_proposed_poles_are_real_a_quarter_of_the_first_apart_and_of_the_rig_s_o
     rig = RIGS[name]
     poles = np.linalg.eigvals(rig.linear(at).A)
     pace = poles.real.max() if at == "inverted" else np.abs(poles[np.abs(poles.imag) > 1e-3]).min()
-    wish = up.design(rig, at=at).wish
-    assert wish.proposed in (0.7, 1.0, 1.4, 2.0)
-    np.testing.assert_allclose(wish.poles, -wish.proposed * pace * np.array([1.0, 1.25, 1.5, 1.75]), rtol=1e-9)
+    request = up.design(rig, at=at).request
+    assert request.proposed in (0.7, 1.0, 1.4, 2.0)
+    np.testing.assert_allclose(request.poles, -request.proposed * pace * np.array([1.0, 1.25, 1.5, 1.75]), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
