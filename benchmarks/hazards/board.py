@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.hazards.story import SAFE, Column, Happened, Story, Telling, in_loop
 from upright.errors import RigStopped
 from upright.rigs import Mode
-from upright.rigs.board import told
+from upright.rigs.board import fault_text
 from upright.rigs.onboard import OnboardLaw, onboard
 from upright.rigs.wire import Kind, exchange, pack
 
@@ -130,7 +130,7 @@ def past_supervisor(law: Callable[[Any], Any], sent: Callable[[OnboardLaw], Onbo
             for _ in range(round(4.0 / column.period)):
                 story.tick = on.rig.exchange(0.0)
                 if story.tick.faults:
-                    raise RigStopped(f"{beside.about.name} stopped itself: {told(story.tick.faults)}.")
+                    raise RigStopped(f"{beside.about.name} stopped itself: {fault_text(story.tick.faults)}.")
             story.told = SAFE
         except RigStopped as stop:
             story.told = str(stop)
