@@ -41,7 +41,8 @@ identification
 rig
 study
 study.draft
-control live
+control
+live
 rigs
 realtime
 report
