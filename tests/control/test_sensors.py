@@ -31,8 +31,8 @@ from upright.control.sensors import (
 )
 from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
+from upright.experiments.nonideal import nonideal
 from upright.experiments.swing_up_2b.run import scales_of_log
-from upright.experiments.worn import worn
 from upright.physics import Furuta
 from upright.readers import read
 from upright.records import Record
@@ -291,7 +291,7 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
     sampled = linear.to_sampled(model.period, model.delay / model.period)
     gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     law = design.feedback(design.filtered(sampled, 0.5), gains.K)
-    truth, watch = coarse(worn(make_rig(make, seed), seed)), Watch(model)
+    truth, watch = coarse(nonideal(make_rig(make, seed), seed)), Watch(model)
     run, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
     assert alarm.sample[0] == -1
     assert np.any(run.u[-200:] != 0.0)  # the drive stays on

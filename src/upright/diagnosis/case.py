@@ -144,8 +144,8 @@ class Case:
 
     def over_time(self, *columns: str) -> tuple[Panel, ...]:
         """Columns over the whole record, those that the log has."""
-        found = [self.inspection.column(name) for name in columns if name in self.record.signals]
-        return tuple(self._panel(c, slice(None), "steps" if c.stepwise else "line") for c in found)
+        present = [self.inspection.column(name) for name in columns if name in self.record.signals]
+        return tuple(self._panel(c, slice(None), "steps" if c.stepwise else "line") for c in present)
 
     def near(self, column: str, i: int) -> Panel:
         """Readings of a column near sample `i`."""
@@ -255,23 +255,23 @@ def _recognised(record: Record, inspection: Inspection, plant: type[Plant] | Non
     """Columns found by name and kind; a plant that needs angles gets none from counts of an unknown encoder."""
     named = "" if plant is None else name_of(plant)
     try:
-        found = recognise(record, inspection, named)
+        recognised = recognise(record, inspection, named)
     except BadInput:
-        found = None
-    column = found.drive if found else drive_column(record, inspection)
+        recognised = None
+    column = recognised.drive if recognised else drive_column(record, inspection)
     u: Array = record[column.name] if column is not None else np.zeros(record.t.size)
     if column is not None and any(lie.startswith("the first samples are outliers") for lie in column.lies):
         u = np.concatenate([np.full(3, u[3]), u[3:]])
     places: dict[str, Place] = {}
     chain = plant is not None and not any(c.name in ("theta", "psi", "x") for c in plant.coordinates)
     for coordinate in plant.coordinates if plant is not None else ():
-        c = found.columns.get(coordinate.name) if found is not None else None
-        if c is None or found is None:
+        c = recognised.columns.get(coordinate.name) if recognised is not None else None
+        if c is None or recognised is None:
             continue
         factor = {"rad": 1.0, "": 1.0, "deg": math.pi / 180, "m": 1.0, "mm": 1e-3}.get(c.guess, 0.0)
         if factor or chain or coordinate.unit == "m":
             factor = factor or 1.0
-            y = factor * (record[c.name] - found.rest[coordinate.name])
+            y = factor * (record[c.name] - recognised.rest[coordinate.name])
             unit = c.guess if c.guess == "counts" else coordinate.unit
             places[coordinate.name] = Place(column=c.name, y=y, resolution=factor * c.resolution.step, unit=unit)
     return Case(

@@ -81,19 +81,19 @@ def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = Fa
     from upright.report.symbols import typed
 
     record, path = open_log(log)
-    seen = inspect(record)
+    inspection = inspect(record)
     files: list[Path] = []
     if plot or out is not None:
         from upright.report.drawing import save
 
         at = Path() if out is None else Path(out)
         files.append(at if at.suffix in (".svg", ".png") else picture_path(path, folder(at)))
-        save(draw_columns(record, seen), files[-1])
+        save(draw_columns(record, inspection), files[-1])
     onward = Step(
         "Write a study file, filled in with what was recognised.", f"upright init {typed(path)} -o study.toml"
     )
-    numbers = asdict(seen) | {"figure": str(files[0]) if files else ""}
-    return Answer(seen, replace(chapter(record, seen), steps=(onward,), numbers=numbers), files)
+    numbers = asdict(inspection) | {"figure": str(files[0]) if files else ""}
+    return Answer(inspection, replace(chapter(record, inspection), steps=(onward,), numbers=numbers), files)
 
 
 @command("Log", name="show", defaults={"out": "."}, more="upright show swing.csv")
@@ -122,17 +122,17 @@ def show_logs(
     at, figures = folder(out), list[Path]()
     steps: tuple[Step, ...] = ()
     for k, log in enumerate(logs, start=1):
-        seen = show(log, out=picture_path(Path(log), at, figures) if plot else None)
-        figures += seen.files
-        steps = steps or seen.chapter.steps
-        yield Answer(seen.value, replace(seen.chapter, steps=steps if k == len(logs) else ()), seen.files)
+        answer = show(log, out=picture_path(Path(log), at, figures) if plot else None)
+        figures += answer.files
+        steps = steps or answer.chapter.steps
+        yield Answer(answer.value, replace(answer.chapter, steps=steps if k == len(logs) else ()), answer.files)
 
 
-def picture_path(log: Path, out: Path, taken: Sequence[Path] = ()) -> Path:
+def picture_path(log: Path, out: Path, used: Sequence[Path] = ()) -> Path:
     """Where the columns of a log are drawn, beside the pictures of other logs that may be called the same."""
     stem = f"show-{_stem(log)}"
     path, n = out / f"{stem}.svg", 2
-    while path in taken:
+    while path in used:
         path, n = out / f"{stem}-{n}.svg", n + 1
     return path
 
@@ -211,9 +211,9 @@ def doctor(
     else:
         record, path = open_log(log)
     diagnosis = examine(record, known, wiring, before=mended)
-    told = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
-    told = replace(told, numbers=_plain_diagnosis(diagnosis, page))
-    return Answer(diagnosis, told, [] if page is None else write_page(told, page, pdf))
+    written = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
+    written = replace(written, numbers=_plain_diagnosis(diagnosis, page))
+    return Answer(diagnosis, written, [] if page is None else write_page(written, page, pdf))
 
 
 def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]:
@@ -242,7 +242,7 @@ def _file(log: Log) -> Path | None:
 
 def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
     """A diagnosis as plain dicts, lists, text and numbers; pictures stay in the page."""
-    said = ("kind", "columns", "severity", "sentence", "evidence", "advice", "key")
+    names = ("kind", "columns", "severity", "sentence", "evidence", "advice", "key")
     return {
         "file": diagnosis.file,
         "rig": diagnosis.rig,
@@ -250,7 +250,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
         "samples": diagnosis.samples,
         "duration": diagnosis.duration,
         "wrong": bool(diagnosis.wrong),
-        "findings": [{name: getattr(f, name) for name in said} for f in diagnosis.findings],
+        "findings": [{name: getattr(f, name) for name in names} for f in diagnosis.findings],
         "checked": list(diagnosis.checked),
         "unchecked": dict(diagnosis.unchecked),
         "page": str(html) if html is not None else "",
@@ -340,8 +340,8 @@ def init(
     if beside is not None:
         record.to_csv(beside)
         files.append(beside)
-    told = ("# Fits ", "# GUESSED")
-    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(told)]
+    marks = ("# Fits ", "# GUESSED")
+    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(marks)]
     marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
     measure = list(dict.fromkeys(marked))
     if measure:
@@ -418,18 +418,18 @@ def law(
             f"{path.name} holds the columns {', '.join(record.names)}; say which one the law put out (--command) and"
             " which it read (--measured, and --reference if it followed one)."
         )
-    found = recover_law(
+    recovery = recover_law(
         record, measured=texts(measured), references=texts(reference), command=command,
         feedforward=texts(feedforward), every=every,
     )  # fmt: skip
-    plain = as_json(found)
-    told = replace(chapter(record, found, typed(path.name)), numbers=json.loads(plain))
+    plain = as_json(recovery)
+    page = replace(chapter(record, recovery, typed(path.name)), numbers=json.loads(plain))
     files: list[Path] = []
     if at is not None:
         from upright.report.drawing import save
 
         files = [at / f"law-{_stem(path)}.{ending}" for ending in ("json", "svg")]
         replace_file(files[0], f"{plain}\n".encode())
-        save(draw_law(record, found), files[1])
-        files += write_page(told, at / f"law-{_stem(path)}.html", pdf)
-    return Answer(found, told, files)
+        save(draw_law(record, recovery), files[1])
+        files += write_page(page, at / f"law-{_stem(path)}.html", pdf)
+    return Answer(recovery, page, files)

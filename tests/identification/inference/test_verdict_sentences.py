@@ -357,7 +357,7 @@ PROMISED = Bands(quantile=1.0, spreads={})
 
 def test_a_promise_is_kept_from_seven_tenths_on() -> None:
     short, kept = (promise(inside("r", n), PROMISED) for n in (69, 70))
-    assert (short.kept, kept.kept) == (False, True)
+    assert (short.holds, kept.holds) == (False, True)
     assert short.sentence == (
         "Predicted worse than the fit promises: inside the 90 % bands lie only r theta 69 % of the samples "
         "(70 % is the least)."
@@ -374,9 +374,9 @@ def test_without_bands_a_signal_may_fall_behind_the_worst_fitted_one_by_fifteen(
     fitted = {"one": {"theta": 90.0}, "two": {"theta": 99.0}}
     for percent, kept in ((75.0, True), (74.9, False)):
         told = promise({"r": score("predict", theta=percent)}, None, fitted)
-        assert told.kept == kept
+        assert told.holds == kept
         assert ("(r theta 74.9 %)" in told.sentence) != kept
-    assert promise({"r": score("predict", theta=81.0)}, None, {"one": {"theta": 99.0}}).kept  # good all the same
+    assert promise({"r": score("predict", theta=81.0)}, None, {"one": {"theta": 99.0}}).holds  # good all the same
     for percent, kept in ((80.0, True), (79.9, False)):  # never fitted: good, or not
-        assert promise({"r": score("predict", psi=percent)}, None, fitted).kept == kept
-    assert not promise({"r": score("predict", psi=79.9)}, None).kept
+        assert promise({"r": score("predict", psi=percent)}, None, fitted).holds == kept
+    assert not promise({"r": score("predict", psi=79.9)}, None).holds

@@ -205,10 +205,10 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
 def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
     counts, whose = log.counts[coordinate.unit]
-    told = f"{whose}; what is said in V, s and counts does not depend on it"
+    sentence = f"{whose}; what is said in V, s and counts does not depend on it"
     driven = log.recognised.drive is not None
     return sensor_table(
-        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, told), driven=driven
+        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, sentence), driven=driven
     )
 
 

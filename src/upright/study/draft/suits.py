@@ -14,12 +14,12 @@ COUNTED = ("counts", "")
 MOST_BODIES = 3
 
 
-def plants_that_suit(record: Record, seen: Inspection) -> tuple[str, ...]:
+def plants_that_suit(record: Record, inspection: Inspection) -> tuple[str, ...]:
     """Plants whose coordinates a log's moving columns can measure, the likeliest first; none when none can."""
-    places = position_columns(record, seen)
+    places = position_columns(record, inspection)
     if not places:
         return ()
-    drive = drive_column(record, seen)
+    drive = drive_column(record, inspection)
     likely, _ = plant_of(places, drive)
     if all(c.guess in COUNTED for c in places):
         places = places[:MOST_BODIES]
