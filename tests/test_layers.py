@@ -42,13 +42,13 @@ rig
 study
 study.draft
 control
-live
 rigs
 realtime
 report
 report.fit
 report.ladder report.law report.log report.rig
 report.run
+live
 diagnosis questionnaire designing
 paper
 running

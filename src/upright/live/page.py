@@ -14,6 +14,7 @@ import numpy as np
 from upright.live import SCRIPTS
 from upright.live.twin import LONGEST_DELAY
 from upright.physics import Plant
+from upright.report.html import rendered
 
 _COLOURS = ("var(--q0)", "var(--q1)", "var(--q2)", "var(--q3)")
 
@@ -48,7 +49,6 @@ def page(
     seed : int
         Of their draw.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
     style = _file("play.css")
@@ -61,11 +61,8 @@ def page(
     driven = data["coordinates"][data["moved"]]["meaning"].rpartition(" of the ")[2]
     zero = "; ".join(f"{c['name']}: {c['meaning']}" for c in data["coordinates"])
     allowed = f"script-src {_hash(script)} 'wasm-unsafe-eval' blob:; worker-src blob:; style-src {_hash(style)}"
-    templates = Environment(
-        loader=PackageLoader("upright.live", ""), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    return templates.get_template("play.html").render(
+    return rendered(
+        "upright.live", "play.html",
         policy=f"default-src 'none'; {allowed}",
         style=Markup(style), script=Markup(script), picture=Markup(picture), view=view, name=data["name"],
         headline=headline, cautions=cautions, share=share, start=start, seed=seed,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -76,7 +77,7 @@ def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lan
     coordinates = list(plant.coordinates)
     moved = [c.name for c in coordinates].index(plant.inputs[0].on)
     drive = {**rig.drive, "actuator.delay": max(rig.delay, LONGEST_DELAY)}  # room for commands on their way
-    common = {"rig": rig, "law": law, "drive": drive, "at": task.at}
+    kernel = partial(_kernel, rig, law, drive, task.at)
     return {
         "name": rig.name,
         "coordinates": [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in coordinates],
@@ -101,9 +102,9 @@ def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lan
         "K": loop.K[0].tolist(),
         "poles": [[z.real, z.imag] for z in np.linalg.eigvals(model.A - model.B @ loop.K).tolist()],
         "estimator": {k: getattr(loop.estimator, k).tolist() for k in ("A", "B", "E", "C", "D", "begin")},
-        "one": _kernel(**common, others={}, starts=np.array([task.start]), samples=FRAME, record=True),
-        "many": _kernel(
-            **common, others=others, starts=starts, samples=round(task.seconds / rig.period) + 1,
+        "one": kernel(others={}, starts=np.array([task.start]), samples=FRAME, record=True),
+        "many": kernel(
+            others=others, starts=starts, samples=round(task.seconds / rig.period) + 1,
             record=bool(np.isfinite(rig.speed_limit)),
         ),
         "lanes": lanes,
@@ -111,7 +112,7 @@ def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lan
 
 
 def _kernel(
-    rig: Rig, law: Law, drive: Mapping[str, float], at: str, others: Mapping[str, Array], starts: ArrayLike,
+    rig: Rig, law: Law, drive: Mapping[str, float], at: str, *, others: Mapping[str, Array], starts: ArrayLike,
     samples: int, record: bool,
 ) -> dict[str, Any]:  # fmt: skip
     first = np.asarray(starts, dtype=np.float64)
