@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from upright.basis import in_percent
 from upright.control.effort import shown
 from upright.designing.run import Designed, Holding, VelocityLoop
 from upright.gains.lqr import locus
@@ -15,7 +16,7 @@ from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
 from upright.report.rig import rig_table
-from upright.report.symbols import number, percent, plain
+from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
 from upright.rig import Rig
 from upright.rig.completion import doubts
@@ -41,8 +42,9 @@ def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = "."
         gains.append(f"Weight of the effort: {number(design.R)}.")
     sure: list[Block] = []
     if design.chance is not None:
-        stand = f"{percent(100 * design.chance)} stand with these gains"
-        sure.append(Points((f"Of the rigs that the fit's covariance allows, {stand}.",)))
+        stable = design.basis.supported(in_percent(design.chance))
+        what = "Share of the rigs sampled from the fit's covariance that these gains stabilise"
+        sure.append(Points((f"{what}: {stable}.",)))
     plain_matrices = isinstance(design.rig, StateSpace)
     loop = (
         f"Period {1e3 * design.request.period:.4g} ms, command {design.sampled.delay:.3g} samples late "
@@ -211,7 +213,7 @@ def _numbers(design: Designed) -> dict[str, Any]:
         "lag": design.sampled.lag,
         "peak_command": design.peak,
         "peak_command_sampled": design.peak_sampled,
-        "chance_over_the_fit": design.chance,
+        "chance_over_the_fit": None if design.chance is None else design.basis.supported(design.chance),
         "at_rest": None if design.holding is None else _at_rest(design.holding),
         "readings": _readings(design),
         "states_from": design.chosen.name,

@@ -15,6 +15,7 @@ from upright.errors import BadInput
 from upright.physics import Plant, find, name_of
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.rig import Hardware, Rig
 from upright.study.description import rig_with_guesses
 from upright.study.draft.recognise import RATE, drive_column, recognise
@@ -105,7 +106,7 @@ class Case:
             derived, n = self.plant.derived(without=frozenset(self.plant.optional)), len(self.plant.coordinates)
             apart = sum(text != "0" for text in derived.mass) == n  # joined by forces alone
             return apart and not derived.trig and len({c.unit for c in self.plant.coordinates}) == 1
-        return all(column_unit(c) in ("counts", "m", "mm") for c in self.measured)
+        return all(column_unit(c) in ("counts", *LENGTHS) for c in self.measured)
 
     def moves(self, name: str) -> bool:
         """Whether a coordinate moves by more than 3 % of the largest motion in the same unit."""
@@ -268,7 +269,7 @@ def _recognised(record: Record, inspection: Inspection, plant: type[Plant] | Non
         c = recognised.columns.get(coordinate.name) if recognised is not None else None
         if c is None or recognised is None:
             continue
-        factor = {"rad": 1.0, "": 1.0, "deg": math.pi / 180, "m": 1.0, "mm": 1e-3}.get(c.guess, 0.0)
+        factor = {"": 1.0, **ANGLES, **LENGTHS}.get(c.guess, 0.0)
         if factor or chain or coordinate.unit == "m":
             factor = factor or 1.0
             y = factor * (record[c.name] - recognised.rest[coordinate.name])

@@ -24,7 +24,7 @@ from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
 from upright.rig import Hardware, Rig
-from upright.study.clock import check_clock
+from upright.study.clock import check_clock, with_time_unit
 from upright.study.coordinates import Sensors
 from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.keys import names
@@ -133,7 +133,7 @@ def load_study(
     plant = plant or read_plant(study)
     rig = read_rig(study, plant, drive_unit(study), fixed)
     folder = Path(data) if data is not None else path.parent
-    logs = {(name, "", ""): record for name, record in (records or {}).items()}
+    logs = {(name, "", "", ""): record for name, record in (records or {}).items()}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
     hardware = read_hardware(study, plant, rig, [log.provenance.rig for log in logs.values()])
     rig = with_noise(rig, runs)
@@ -154,22 +154,23 @@ def load_study(
     )
 
 
-def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -> Record:
+def _log(run: Section, folder: Path, logs: dict[tuple[str, ...], Record]) -> Record:
     """Record of the file a run names, read once."""
     from upright.readers import read
 
     name = run.text_of("file", "logs/run_01.csv")
     reader = run.text_of("reader", "csv") if "reader" in run else ""
     time = run.text_of("time", "t") if "time" in run else ""
-    key = (name, reader, time)
+    unit = run.text_of("time_unit", "ms") if "time_unit" in run else ""
+    key = (name, reader, time, unit)
     if key not in logs:
         file = folder / name
         if not os.path.exists(file):  # Path.exists raises for a name that is too long
             raise run.error("file", f"the log {str(file)[-200:]} does not exist; {_instead(file, folder)}")
         with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)
-        with run.at("time"):
-            logs[key] = record.replace(t=record[time]) if time else record
+        with run.at("time_unit" if unit else "time"):
+            logs[key] = with_time_unit(record.replace(t=record[time]) if time else record, unit)
     return logs[key]
 
 

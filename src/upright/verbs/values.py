@@ -46,8 +46,10 @@ if TYPE_CHECKING:
     """A log: its file, a record, or a data frame."""
 
 
-def open_log(log: Log, reader: str = "") -> tuple[Record, Path]:
+def open_log(log: Log, reader: str = "", time_unit: str = "") -> tuple[Record, Path]:
     """Record of a log and the path that it is called by; ``log`` for one that comes from no file.
+
+    A `time_unit` is that of a time column which states none.
 
     Raises
     ------
@@ -56,9 +58,10 @@ def open_log(log: Log, reader: str = "") -> tuple[Record, Path]:
     """
     if isinstance(log, str | os.PathLike):
         from upright.readers import read
+        from upright.study.clock import with_time_unit
 
         path = Path(log)
-        return read(path, reader=reader or None), path
+        return with_time_unit(read(path, reader=reader or None), time_unit), path
     from upright.records import Record
 
     if not isinstance(log, Record):

@@ -73,7 +73,7 @@ def attempt(stabilised, saturated=0.0, busy=0.0, rest_rms=0.0, push=1.0):
         "stabilised with excessive effort": busy,
     }
     return SimpleNamespace(before=SimpleNamespace(
-        words=words, quiet_chance=stabilised + saturated, chance=stabilised + saturated + busy, rest_rms=rest_rms,
+        words=words, quiet_share=stabilised + saturated, share=stabilised + saturated + busy, rest_rms=rest_rms,
         push=push,
     ))  # fmt: skip
 
@@ -111,7 +111,7 @@ def test_coarse_encoders_make_the_verdict_name_the_command_at_rest(tmp_path):
     assert "No pole set is recommended" in told.verdict
     assert "The command at rest has an rms of" in told.verdict
     calm = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, request=replace(wish, speed="kalman"))
-    assert calm.best.before.quiet_chance == 1.0
+    assert calm.best.before.quiet_share == 1.0
     assert "The command at rest" not in regulation_page.chapter(calm).verdict
 
 

@@ -322,8 +322,8 @@ def test_the_loop_is_judged_on_the_fastest_pole_with_its_digits() -> None:
     told = growing(10.0, 9.9, 10.1, 0.05)
     assert told.answer == "yes"
     assert told.headline == (
-        "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); a loop whose poles are as fast as that holds "
-        "99 % of the rigs within the intervals."
+        "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); a loop with poles as fast as that "
+        "stabilises 99.4 % of the rigs within the intervals."
     )
     assert told.advice == ""
     at_limit = growing(10.0, 9.0, 11.0, 0.5)  # a tenth to either side, included
@@ -380,3 +380,14 @@ def test_without_bands_a_signal_may_fall_behind_the_worst_fitted_one_by_fifteen(
     for percent, kept in ((80.0, True), (79.9, False)):  # never fitted: good, or not
         assert promise({"r": score("predict", psi=percent)}, None, fitted).holds == kept
     assert not promise({"r": score("predict", psi=79.9)}, None).holds
+
+
+@pytest.mark.parametrize("status", ["at bound", "firm", "weak"])
+def test_a_mass_that_went_to_nothing_fails_the_fit_in_a_sentence(status: str) -> None:
+    guessed = rig(Furuta, FURUTA, {"J_d": 2e-3})
+    told = judged(estimates={"J_d": firm(5e-13, status=status, unit="kg m^2")}, rig=guessed)
+    assert told[1].answer == "no"
+    assert not trusted(told)
+    assert any(r.startswith("J_d went to nothing, 5e-13 kg m^2, from a guess of 0.002:") for r in told[1].reasons)
+    small = judged(estimates={"J_d": firm(4e-9, status="weak", unit="kg m^2")}, rig=guessed)
+    assert not any("went to nothing" in r for r in small[1].reasons)  # 2 millionths are small, and still a number

@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from upright.basis import in_percent
 from upright.control import Score
 from upright.control.effort import FELT, RestEffort, of_limit, shown
 from upright.control.preflight import BUSY, SATURATED, STABILISED, WORDS, word
 from upright.control.score import effort_at_rest
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
-from upright.experiments.regulation_2.run import SETS, Attempt, Regulation, VelocityRun
+from upright.experiments.regulation_2.run import DRAWS, SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.rig import rig_table
 from upright.report.symbols import number, plain
 from upright.rig import Rig
 
+SURE = 0.8
+"""Lower end of the probability's 95 % interval from which a recommendation stands: 16 rigs of 16 reach it."""
 SHOWN = 2.5
 """Seconds of the runs that are drawn."""
 
@@ -35,8 +38,9 @@ def chapter(result: Regulation) -> Chapter:
         steps=tuple(_steps(result)),
         findings=tuple(
             KeyNumber(
-                what=f"probability that {a.name} stabilises",
-                value=f"{100 * a.before.chance:.0f} %" + (f"; it {a.word}" if a.word and result.truth is None else ""),
+                what=f"most likely result of {a.name}",
+                value=f"{a.before.word} ({_probability(a, a.before.words[a.before.word])})"
+                + (f"; measured: {a.word}" if a.word and result.truth is None else ""),
                 truth="" if result.truth is None else a.word,
             )
             for a in result.attempts
@@ -48,16 +52,7 @@ def chapter(result: Regulation) -> Chapter:
 
 def _verdict(result: Regulation) -> str:
     """Which set to use, and whether the runs agreed with their predictions."""
-    best = result.best
-    share = best.before.words[STABILISED]
-    head = (
-        f"Use {best.name}: it stabilises {_of_rigs(result, share)} without saturation; on 95 % of them the command at "
-        f"rest has an rms of {of_limit(best.before.rest_rms, 'at most ')}."
-        if share >= 0.5
-        else f"No pole set is recommended for this start. The best, {best.name}, stabilises "
-        f"{_of_rigs(result, share)} without saturation or excessive effort; "
-        f"most often the result is: {best.before.word}."
-    )
+    best, head = result.best, _recommended(result)
     ran = result.ran
     if not ran:
         return f"{head}{_excess(result, best)} Nothing was run: this is what the model says."
@@ -66,12 +61,32 @@ def _verdict(result: Regulation) -> str:
         runs = f"All {len(ran)} runs agreed with their predictions." if len(ran) > 1 else "The run agreed with that."
     else:
         others = "; ".join(
-            f"{a.name}: {a.word} (predicted probability {100 * a.before.words[a.word]:.0f} %)"
+            f"{a.name}: {a.word} (predicted probability {_probability(a, a.before.words[a.word])})"
             for a in ran
             if a not in agreed
         )
         runs = f"{len(agreed)} of {len(ran)} runs agreed with their predictions. Not so: {others}."
     return f"{head} {runs}{_excess(result, best)}"
+
+
+def _recommended(result: Regulation) -> str:
+    """Which set to use, where the model supports a recommendation and one is good enough."""
+    best = result.best
+    if not best.before.basis.supports:
+        return (
+            "No pole set is recommended, and no probability is given, since both would rest on the model; in "
+            f"simulations of it {best.name} did best."
+        )
+    share = best.before.words[STABILISED]
+    if share < 0.5:
+        return (
+            f"No pole set is recommended for this start. The best, {best.name}, stabilises {_of_rigs(result, share)} "
+            f"without saturation or excessive effort; most often the result is: {best.before.word}."
+        )
+    return (
+        f"Use {best.name}: it stabilises {_of_rigs(result, share)} without saturation; on 95 % of them the command at "
+        f"rest has an rms of {of_limit(best.before.rest_rms, 'at most ')}."
+    )
 
 
 def _of_rigs(result: Regulation, share: float) -> str:
@@ -100,7 +115,8 @@ def _sound(result: Regulation) -> bool:
     """Whether the set to use is sure and quiet beforehand, and was so where it was run."""
     best = result.best
     ran_well = best.score is None or best.word in (STABILISED, SATURATED)
-    return not result.interrupted and ran_well and best.before.words[STABILISED] > 0.9
+    enough = best.before.interval[0] >= SURE
+    return not result.interrupted and ran_well and enough and best.before.words[STABILISED] > 0.9
 
 
 def _detail(result: Regulation) -> str:
@@ -112,6 +128,13 @@ def _detail(result: Regulation) -> str:
         else "The fit states no uncertainty, so only dry friction and the release by hand vary: the probabilities are "
         "too high."
     )
+    low, high = result.best.before.interval
+    if low < SURE <= high:
+        spread += (
+            f" {result.request.draws} {'rigs say' if result.request.draws > 1 else 'rig says'} little: stabilised in "
+            f"{in_percent(result.best.before.share)} of them, the probability lies between {in_percent(low)} and "
+            f"{in_percent(high)} (95 % interval). Draw more (--draws {DRAWS})."
+        )
     return spread + (" Stopped by Ctrl-C before every set was run." if result.interrupted else "")
 
 
@@ -124,7 +147,7 @@ def _sentence(result: Regulation, a: Attempt) -> str:
         else "the sampled loop is not stable"
     )
     predicted = (
-        f"{a.name[:1].upper()}{a.name[1:]}: predicted probability of stabilisation {100 * b.chance:.0f} %"
+        f"{a.name[:1].upper()}{a.name[1:]}: predicted probability of stabilisation {_probability(a, b.share)}"
         f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}; rms at rest "
         f"{of_limit(b.rest_rms)}."
     )
@@ -133,8 +156,15 @@ def _sentence(result: Regulation, a: Attempt) -> str:
     return f"{predicted} {_came(result.rig, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
 
 
+def _probability(a: Attempt, share: float) -> str:
+    """A share of the simulated rigs as the probability that it stands for."""
+    return str(a.before.basis.supported(in_percent(share)))
+
+
 def _shares(a: Attempt) -> str:
-    return ", ".join(f"{w} {100 * a.before.words[w]:.0f} %" for w in WORDS if a.before.words[w] > 0)
+    if not a.before.basis.supports:
+        return f"most simulated runs of the model: {a.before.word}"
+    return ", ".join(f"{w} {in_percent(a.before.words[w])}" for w in WORDS if a.before.words[w] > 0)
 
 
 def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
@@ -190,7 +220,7 @@ def _prediction_table(result: Regulation) -> Table:
         b = a.before
         noise = "–" if b.noise is None else number(b.noise, 2)
         rows.append(
-            (a.name, b.word, f"{100 * b.chance:.0f} %", f"{math.degrees(b.tilt):.0f}", f"{b.push:.1f}", noise,
+            (a.name, b.word, _probability(a, b.share), f"{math.degrees(b.tilt):.0f}", f"{b.push:.1f}", noise,
              *_figures(result, b.score))
         )  # fmt: skip
         if a.score is not None:
@@ -354,7 +384,8 @@ def _set(a: Attempt) -> dict[str, Any]:
         "poles": a.placement.requested,
         "K": a.placement.K[0],
         "before": {
-            "word": b.word, "words": dict(b.words), "chance": b.chance, "tilt": b.tilt, "push": b.push,
+            "word": b.word, "words": dict(b.words), "chance": b.basis.supported(b.share),
+            "interval": b.basis.supported(b.interval), "tilt": b.tilt, "push": b.push,
             "command_noise": b.noise, "rest_rms_95": b.rest_rms,
             "margins": b.margins, "rest": _rest(b.rest),
             **_scored(b.score),

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.basis import SIMULATED
+from upright.basis import SIMULATED, in_percent
 from upright.control import Score, Trial, score, trial
 from upright.control.preflight import STABILISED, Preflight, Task, preflight, word
 from upright.designing.run import SPEEDS, velocities
@@ -180,7 +180,7 @@ class Regulation:
 
 def _rank(a: Attempt) -> tuple[float, ...]:
     b = a.before
-    sure = (b.words[STABILISED], b.quiet_chance, b.chance)
+    sure = (b.words[STABILISED], b.quiet_share, b.share)
     return (*(round(share, 2) for share in sure), -round(b.rest_rms, 2), b.push)
 
 
@@ -312,12 +312,13 @@ def _foreseen(
 
 def _came(stand: TestStand, foreseen: Attempt, task: Task, seed: int, folder: Path) -> Came | None:
     """The law of an attempt on the rig; None where it is too likely that a live pendulum falls."""
-    chance = foreseen.before.chance
-    if not stand.simulated and chance < AT_LEAST:
+    share, basis = foreseen.before.share, foreseen.before.basis
+    if not stand.simulated and share < AT_LEAST:
         return None
     driven, pendulum = stand.names
     stand.ask(
-        f"Next is {foreseen.name}, predicted probability of stabilisation {100 * chance:.0f} %. Let {pendulum} hang at "
+        f"Next is {foreseen.name}, predicted probability of stabilisation "
+        f"{basis.supported(in_percent(share))}. Let {pendulum} hang at "
         f"rest; after a small pulse bring it up with {driven} in the middle of its travel, hold both there until the "
         "loop takes them, and let go."
     )

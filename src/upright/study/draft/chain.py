@@ -17,6 +17,7 @@ from upright.physics.regressor import regressor
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
@@ -35,8 +36,6 @@ from upright.study.draft.tables import (
 )
 from upright.study.rig import per
 from upright.study.text import TomlTable
-
-SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
 
 REACH = 10.0
 """Volts that ECP's converter can put out; its log shows what the program asked for."""
@@ -107,7 +106,7 @@ def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
     c = log.recognised.columns[name]
     if c.guess == "counts":
         return 2 * np.pi / log.counts["rad"][0] if _unit(plant, name) == "rad" else 1 / log.counts["m"][0]
-    return SI.get(c.guess, 1.0)
+    return (ANGLES | LENGTHS).get(c.guess, 1.0)
 
 
 def _volts(c: Column) -> tuple[str, float]:

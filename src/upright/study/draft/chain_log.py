@@ -13,6 +13,7 @@ from upright.errors import BadInput, UprightError
 from upright.physics import find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
 from upright.study.draft.described import COUNTS, counts_of
@@ -186,9 +187,9 @@ def chain_kind(
     pushed = last * float(most[-1] - most[0]) * (-1 if against else 1) > 0
     released = drive is not None and not pushed  # driven, and nothing holds them at the end
     units = {c.guess for c in columns}
-    if units & {"rad", "deg"}:
+    if units & ANGLES.keys():
         return "torsional", "they are angles"
-    if units & {"m", "mm"}:
+    if units & LENGTHS.keys():
         return "rectilinear", "they are lengths"
     if float(np.ptp(most)) > RUNS_AWAY:
         return "torsional", f"{np.ptp(most):.0f} counts are more than a cart can travel"

@@ -11,6 +11,7 @@ from upright.physics import find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.text import TomlTable
 from upright.units import scale
@@ -83,6 +84,6 @@ def is_cut_off(command: Array, share: float) -> bool:
 def _went(recognised: Recognised, body: str, unit: str) -> str:
     """Half of what the driven body went through, "..." where its column is in counts."""
     c = recognised.columns.get(body)
-    if c is None or c.guess not in ("rad", "deg", "m", "mm"):
+    if c is None or c.guess not in ANGLES | LENGTHS:
         return f"... {unit}"
     return with_unit((c.high - c.low) / 2 * scale(c.guess), unit)

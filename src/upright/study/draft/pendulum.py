@@ -19,6 +19,7 @@ from upright.physics import Plant, find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
@@ -254,7 +255,7 @@ def _gain(recognised: Recognised) -> float:
     """Force per command of the right size: what the start inertia needs to swing as far as was seen."""
     assert recognised.drive is not None
     c = next(iter(recognised.columns.values()))
-    swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
+    swing = (c.high - c.low) / 2 * {"counts": 4e-4, **ANGLES, **LENGTHS}.get(c.guess, 1.0)
     u = max(abs(recognised.drive.low), abs(recognised.drive.high)) or 1.0
     u *= command_unit(recognised.drive)[1]
     w = recognised.frequency or 6.0
@@ -307,4 +308,4 @@ def _runs(recognised: Recognised, file: str, label: str) -> list[TomlTable]:
 
 
 def _si(unit: str) -> float:
-    return {"deg": math.pi / 180, "mm": 1e-3, "counts": 2 * math.pi / 4096}.get(unit, 1.0)
+    return {"counts": 2 * math.pi / 4096, **ANGLES, **LENGTHS}.get(unit, 1.0)

@@ -12,7 +12,7 @@ from upright.errors import BadInput
 from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
-from upright.records.columns import bare_name
+from upright.records.columns import ANGLES, LENGTHS, bare_name
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
@@ -22,7 +22,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
-_SI = {"deg": math.pi / 180, "mm": 1e-3}
+_SI = ANGLES | LENGTHS
 _COORDINATES = ("psi", "theta", "x")
 """Of the rigs that carry a pendulum."""
 _DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
@@ -101,7 +101,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
     earlier: tuple[tuple[float, float], ...] = ()
-    turned = {"rad": 1.0, "deg": math.pi / 180}.get(columns[list(columns)[-1]].guess, 0.0)
+    turned = ANGLES.get(columns[list(columns)[-1]].guess, 0.0)
     if drive is None and turned and list(columns)[-1] == "theta":
         angle = turned * (last - centre)
         small = swing_frequency(record.t[inside], angle[inside])
@@ -113,7 +113,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
             window, earlier = swings[-1], tuple(swings[:-1])
         inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
-    if pushed and all(c.guess in ("rad", "deg") or name == "x" for name, c in columns.items()):
+    if pushed and all(c.guess in ANGLES or name == "x" for name, c in columns.items()):
         first, hanging = (_SI.get(c.guess, 1.0) for c in columns.values())
         angle = hanging * (last[inside] - centre)
         mirrored = coupling(find(plant), record.t[inside], first * driven[inside], angle) < 0
@@ -134,7 +134,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
 
 def position_columns(record: Record, inspection: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
-    kinds = ("rad", "m", "counts", "deg", "mm", "")
+    kinds = (*ANGLES, *LENGTHS, "counts", "")
     places = [c for c in inspection.columns if not c.drive and c.name not in record.inputs and c.guess in kinds]
     columns = [c for c in places if not (c.constant or _lies(c, inspection))]
     columns = [
@@ -224,9 +224,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     named = _by_coordinates({bare_name(c.name) for c in places})
     if named:
         return named, f"The columns are called as the coordinates of a {named}."
-    lengths = [c for c in places if c.guess in ("m", "mm")]
+    lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
-    angles = [c for c in places if c.guess in ("rad", "deg")]
+    angles = [c for c in places if c.guess in ANGLES]
     bodies = min(len(counts), 3)
     if counts and not angles and not lengths:
         kind = "torsional" if any(_DISK.search(bare_name(c.name)) for c in counts) else "rectilinear"
@@ -267,7 +267,7 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
     """Column per coordinate: by name, then by kind and order."""
     left, out, missing = list(places), dict[str, Column](), list[str]()
     for coordinate in plant.coordinates:
-        kinds = ("rad", "deg") if coordinate.unit == "rad" else ("m", "mm")
+        kinds = ANGLES if coordinate.unit == "rad" else LENGTHS
         fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
         pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
         best = next((c for c in left if bare_name(c.name) == coordinate.name), None)
@@ -295,7 +295,7 @@ def zero_reading(
         u = record[drive.name]
         first = int(np.argmax(u != u[0]))
         before = x[max(0, first - 50) : first]
-        angle = c.guess in ("rad", "deg")
+        angle = c.guess in ANGLES
         if u[0] == 0 and first >= 5 and not (hangs and not _starts_still(x, u)):
             return float(np.median(before))
         return rest_level(x, inspection, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
