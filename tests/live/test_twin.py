@@ -17,7 +17,8 @@ from upright.control.trial import trial
 from upright.designing.run import velocities
 from upright.gains import feedback
 from upright.live import SCRIPTS
-from upright.live.twin import Loop, moving, outline
+from upright.live.twin import Loop, moving
+from upright.physics.outline import in_javascript
 from upright.rig.completion import completed
 from upright.rig.variation import allowed
 
@@ -134,5 +135,5 @@ def test_rods_are_drawn_where_their_weight_is(name):
 @pytest.mark.parametrize("specimen", SPECIMENS.values(), ids=SPECIMENS)
 def test_every_shipped_plant_is_drawn(specimen):
     if type(specimen.plant).__module__.startswith("upright."):
-        drawn = outline(specimen.plant)
+        drawn = in_javascript(specimen.plant)
         assert all(f'"{c.name}"' in drawn for c in specimen.plant.coordinates)

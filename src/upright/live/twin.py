@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,7 +17,7 @@ from upright.control.trial import SUBSTEPS, law_on_rig
 from upright.gains.velocity import Estimator
 from upright.laws import Law
 from upright.live.kernel import described
-from upright.physics import Plant
+from upright.physics.outline import in_javascript
 from upright.records import Array
 from upright.rig import Rig
 from upright.simulation import Simulator, choose
@@ -96,7 +96,7 @@ def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lan
         "settled": BAND,
         "felt": FELT,
         "moved": moved,
-        "outline": outline(plant),
+        "outline": in_javascript(plant),
         "A": model.A.tolist(),
         "B": model.B[:, 0].tolist(),
         "K": loop.K[0].tolist(),
@@ -124,23 +124,3 @@ def _kernel(
     width = 1 if len(first) == 1 else 16
     call = simulator.call(simulator.table(values, len(first)), x0, samples=samples, width=width)
     return described(simulator, call, width=width)
-
-
-def outline(plant: Plant) -> str:
-    """JavaScript of ``(q) => [[coordinate, [[x, y, z], ...]], ...]``, lines of the rig [m]; empty where it has none."""
-    from sympy import Symbol
-
-    symbols = [Symbol(f"q{i}") for i in range(len(plant.coordinates))]
-    lines = plant.outline(plant, symbols)
-    if not lines:
-        return ""
-    line = '["{}", [{}]]'
-    body = ", ".join(line.format(name, ", ".join(_point(p) for p in points)) for name, points in lines)
-    given = "; ".join(f"const q{i} = q[{i}]" for i in range(len(symbols)))
-    return f"(q) => {{ {given}; return [{body}]; }}"
-
-
-def _point(point: Sequence[Any]) -> str:
-    from sympy import jscode
-
-    return f"[{', '.join(str(jscode(x)) for x in point)}]"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 Point = tuple[Any, Any, Any]
 Outline = list[tuple[str, list[Point]]]
@@ -32,3 +33,33 @@ def circle(radius: Any, z: float) -> list[Point]:
     """A level circle about the vertical through the origin."""
     turns = [2 * math.pi * k / 24 for k in range(25)]
     return [(radius * math.cos(a), radius * math.sin(a), z) for a in turns]
+
+
+class Drawn(Protocol):
+    """What a plant says of how it is drawn."""
+
+    coordinates: Sequence[Any]
+
+    def outline(self, p: Any, q: Any) -> Outline:
+        """Its lines."""
+        ...
+
+
+def in_javascript(plant: Drawn) -> str:
+    """JavaScript of ``(q) => [[coordinate, [[x, y, z], ...]], ...]``, lines of the rig [m]; empty where it has none."""
+    from sympy import Symbol
+
+    symbols = [Symbol(f"q{i}") for i in range(len(plant.coordinates))]
+    lines = plant.outline(plant, symbols)
+    if not lines:
+        return ""
+    line = '["{}", [{}]]'
+    body = ", ".join(line.format(name, ", ".join(_point(p) for p in points)) for name, points in lines)
+    given = "; ".join(f"const q{i} = q[{i}]" for i in range(len(symbols)))
+    return f"(q) => {{ {given}; return [{body}]; }}"
+
+
+def _point(point: Sequence[Any]) -> str:
+    from sympy import jscode
+
+    return f"[{', '.join(str(jscode(x)) for x in point)}]"
