@@ -17,8 +17,8 @@ from benchmarks.mutants import watch
 from benchmarks.mutants.covering import Covering
 from benchmarks.mutants.places import Change
 
-SECONDS, SLOW_SECONDS, SLOWER = 60.0, 120.0, 2.0
-"""Seconds of CPU of the quick tests for one change, of the slow ones, and how much longer they may take in all."""
+SECONDS, LONGER, SLOWER = 60.0, 2.0, 2.0
+"""Seconds of CPU of the quick tests for one change; how many times as long the slow ones have, and both in all."""
 PATIENCE = 1800.0
 """Seconds by the clock on the wall after which a run that no longer says anything hangs."""
 MOST = 400
@@ -125,7 +125,7 @@ class Bench:
         """Whether a test passes alone and without a change; asked once."""
         if test not in self.alone:
             kept = self.report.read_bytes()
-            self.alone[test] = not self._run([test], covering, SLOW_SECONDS)
+            self.alone[test] = not self._run([test], covering, LONGER * SECONDS)
             self.report.write_bytes(kept)
         return self.alone[test]
 
