@@ -2,9 +2,10 @@
 
 Operators, comparisons, constants, guards, indices and signs: each change is one place, drawn from all of them, and the
 quick tests that cover it run until one fails, the nearest and cheapest first, 60 s of CPU of them. `--slow` then runs
-the slow tests that cover what no quick one noticed, 120 s of them; `--seconds` allows less. A test that hangs has noticed. Intervals are
-Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is left out of
-the shares when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
+the slow tests that cover what no quick one noticed, 120 s of them; `--seconds` allows less. A test that hangs has
+noticed. Intervals are Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no
+difference is left out of the shares when a file names it: its lines are `file:line before -> after  # reason`, as they
+are listed.
 """
 
 from __future__ import annotations
@@ -94,7 +95,8 @@ def run(
             by_slow = tried(benches, left, slower, LONGER * seconds, before[1], progress)
     lines = table(done, harmless, by_slow)
     if markdown is not None:
-        asked = f"Sample {len(changes)}, seed {seed}{f', within {within}' * bool(within)}; {len(done)} were tried, {seconds:g} s each."
+        where = f", within {within}" if within else ""
+        asked = f"Sample {len(changes)}, seed {seed}{where}; {len(done)} were tried, with {seconds:g} s of quick tests."
         text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines))
         markdown.write_text(text, encoding="utf-8")
     return lines
