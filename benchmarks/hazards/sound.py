@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.hazards.abreast import Twins
 from benchmarks.hazards.story import POLES
 from upright.control.watch import Watch
-from upright.experiments.worn import worn
+from upright.experiments.nonideal import nonideal
 from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.rig import Rig
@@ -91,7 +91,7 @@ class Played:
         """All of them."""
         known = make_rig(self.make)
         T, n = known.period, len(self.seeds)
-        twins = Twins([worn(make_rig(self.make, s), s) for s in self.seeds], law_for(known), known.limit)
+        twins = Twins([nonideal(make_rig(self.make, s), s) for s in self.seeds], law_for(known), known.limit)
         rngs = [np.random.default_rng([s, 91]) for s in self.seeds]
         pushes = [played_with(self.make, rng, self.seconds, T) for rng in rngs]
         turns = np.array([rng.uniform(0.01, 0.1) for rng in rngs])

@@ -205,7 +205,7 @@ def test_a_preflight_asks_for_the_tilt_and_for_a_tap_of_the_last_coordinate_each
     assert found.margins == design.margins(driven, law(0))
     assert sum(found.words.values()) == 1.0
     assert found.words == {word: float(word == "stabilised") for word in WORDS}
-    assert found.quiet_chance == 1.0
+    assert found.quiet_share == 1.0
 
 
 def test_a_hand_errs_by_its_spread_about_the_start():
@@ -294,4 +294,4 @@ def test_coarse_encoders_make_the_same_gains_excessive_and_a_chance_of_holding_d
     assert found.chance == 1.0
     assert found.word == said
     assert found.rest.quiet is (said == "stabilised")
-    assert found.quiet_chance == float(said == "stabilised")
+    assert found.quiet_share == float(said == "stabilised")

@@ -26,7 +26,7 @@ from upright.control.watch import (
     sticking,
 )
 from upright.control.watch import watched as guarded
-from upright.experiments.worn import worn
+from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 
 MAKES = ("linear", "furuta")
@@ -117,7 +117,7 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
     sampled = linear.to_sampled(model.period, model.delay / model.period)
     gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     law = design.feedback(design.filtered(sampled, 0.5), gains.K)
-    truth, watch = coarse(worn(make_rig(make, seed), seed)), Watch(model)
+    truth, watch = coarse(nonideal(make_rig(make, seed), seed)), Watch(model)
     run, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
     assert alarm.sample[0] == -1
     assert np.any(run.u[-200:] != 0.0)  # the drive stays on
@@ -156,7 +156,7 @@ PROMPT = {make: make_rig(make).replace(delay=0.0, lag=0.0) for make in MAKES}
 
 
 def moving(make, rate=7.0, seconds=3.0, size=0.5, body=1.0, other=1.0, drive=1.0, at_body=0.0, at_other=0.0):
-    """Readings and commands of a loop in closed form, without rounding: everything goes as ``sin(rate t)``.
+    """Readings and commands of a loop in closed form, without rounding: all goes as ``exp(3 t) sin(rate t)``.
 
     Both rows of the model are solved for the coordinates under a command of `size` times the limit and forces at
     either, in shares of what the command does; then the encoders show `body` and `other` times what is true.
@@ -164,14 +164,14 @@ def moving(make, rate=7.0, seconds=3.0, size=0.5, body=1.0, other=1.0, drive=1.0
     rig = PROMPT[make]
     model, T = rig.linear("inverted"), rig.period
     t = np.arange(round(seconds / T)) * T
-    command, s = size * rig.limit, 1j * rate
+    command, s = size * rig.limit, 3.0 + 1j * rate
     force = command * (
         drive * model.B[1::2, 0] + at_body * model.B[1::2, 0] + np.array([0.0, at_other * model.B[3, 0]])
     )
     rows = np.array([[s**2 * (i == j) - model.A[2 * i + 1, 2 * j] - s * model.A[2 * i + 1, 2 * j + 1]
                       for j in range(2)] for i in range(2)])  # fmt: skip
     q = np.linalg.solve(rows, force)
-    turn = np.exp(s * t)
+    turn = np.exp(s * t - 3.0 * seconds)
     return np.imag(np.outer(turn, q)) * [body, other], np.imag(turn) * command
 
 
@@ -231,9 +231,10 @@ def test_a_lean_that_nothing_accelerates_is_a_zero_that_moved_and_small_ones_are
 @pytest.mark.parametrize("make", MAKES)
 def test_a_frame_that_moves_steadily_shows_nothing(make):
     """Galilei: the body's zero drifts at a constant speed, and no law of motion without friction tells."""
-    rig = PROMPT[make].changed(**{n: 0.0 for n in PROMPT[make].plant.names() if n in ("b_1", "c_1", "b_x")})
+    rig = PROMPT[make]
     shown, commands = moving(make)
-    drift = np.arange(len(shown)) * rig.period * 0.08
+    t = np.arange(len(shown)) * rig.period
+    drift = 0.08 * (t - 0.2 * (1 - np.exp(-t / 0.2)))  # it sets in as softly as a coupling begins to creep
     odds = Watch(PROMPT[make]).over(shown + np.column_stack([drift, 0 * drift]), commands).odds
     assert odds.max() < min(BOUNDS.values())
 

@@ -70,7 +70,7 @@ def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(
     told = with_margins(done, FINE, peak_sampled=25.0)._loop_verdict()
     assert "takes 25 V, 250 % of the limit, and saturates the drive; up to 40 % of this start it does not." in told
     assert with_margins(done, FINE, peak_sampled=10.0)._loop_verdict().endswith("takes 100 % of the drive's limit.")
-    free = with_margins(done, FINE, wish=replace(done.wish, limit=None))
+    free = with_margins(done, FINE, request=replace(done.request, limit=None))
     assert free._loop_verdict() == "Stable with margin."
     assert any("whether it saturates is not known" in w for w in chapter(free).warnings)
     assert not any("saturates" in w for w in chapter(done).warnings)
@@ -116,11 +116,11 @@ def test_a_state_of_any_unit_has_a_gain_per_that(unit, per):
 
 
 def test_who_says_how_late_a_command_acts_is_told(done):
-    late = design_for(ARM.replace(delay="3 ms"), done.wish)
+    late = design_for(ARM.replace(delay="3 ms"), done.request)
     assert late.sampled.delay == pytest.approx(1.5)
     for design, words in (
         (late, "1.5 samples late (as the file says)"), (done, "1 samples late (assumed)"),
-        (design_for(ARM, replace(done.wish, delay=2.0)), "2 samples late (as asked)"),
+        (design_for(ARM, replace(done.request, delay=2.0)), "2 samples late (as asked)"),
     ):  # fmt: skip
         assert words in chapter(design).parts[2].content[0]
     plain = StateSpace(A=[[-1.0]], B=[[1.0]], C=[[1.0]])

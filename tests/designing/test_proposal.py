@@ -25,7 +25,7 @@ def test_a_design_without_poles_holds_the_rig(name, at):
     model = rig.linear(at)
     closed = np.linalg.eigvals(model.A - model.B @ np.reshape(design.K, (1, -1)))
     assert closed.real.max() < 0
-    assert np.sort(closed.real) == pytest.approx(np.sort(design.wish.poles.real), rel=1e-6)
+    assert np.sort(closed.real) == pytest.approx(np.sort(design.request.poles.real), rel=1e-6)
     assert design.chosen.margins.modulus > 0.4
     assert "Nobody asked for poles" in str(design)
 
@@ -33,8 +33,8 @@ def test_a_design_without_poles_holds_the_rig(name, at):
 @pytest.mark.parametrize("name", RIGS)
 def test_no_other_pace_is_quieter_with_as_much_margin(name):
     design = up.design(RIGS[name])
-    pace = design.wish.poles.real.max() / -design.wish.proposed
-    others = [up.design(RIGS[name], poles=design.wish.poles * times / design.wish.proposed) for times in PACES]
+    pace = design.request.poles.real.max() / -design.request.proposed
+    others = [up.design(RIGS[name], poles=design.request.poles * times / design.request.proposed) for times in PACES]
     widest = max(d.chosen.margins.modulus for d in others)
     assert design.chosen.margins.modulus >= NEARLY * widest
     louder = [d.chosen.command_noise for d in others if d.chosen.margins.modulus >= NEARLY * widest]
@@ -47,7 +47,7 @@ def test_a_start_that_the_drive_cannot_take_asks_for_slower_poles():
     """Twice the tilt needs twice the command, at any pace; the pace that takes least is then the one."""
     mild, hard = (up.design(RIGS["furuta"], start={"theta": tilt}) for tilt in ("2 deg", "60 deg"))
     assert mild.peak_sampled <= 10
-    peaks = [up.design(RIGS["furuta"], poles=hard.wish.poles * t / hard.wish.proposed, start={"theta": "60 deg"})
+    peaks = [up.design(RIGS["furuta"], poles=hard.request.poles * t / hard.request.proposed, start={"theta": "60 deg"})
              .peak_sampled for t in PACES]  # fmt: skip
     assert hard.peak_sampled == pytest.approx(min(peaks))
 

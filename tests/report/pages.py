@@ -173,7 +173,7 @@ def regulation_page(folder: Path) -> Chapter:
 
     wish = RegulationRequest(draws=16, seconds=2.0)
     known = completed(identify_make("linear", 1, folder))
-    return chapter(run_regulation(known, TwinStand(rig=make_rig("linear", 1)), 1, folder, wish=wish))
+    return chapter(run_regulation(known, TwinStand(rig=make_rig("linear", 1)), 1, folder, request=wish))
 
 
 def swing_up_page(folder: Path) -> Chapter:

@@ -10,7 +10,7 @@ import pytest
 from tests.rigs.test_supervisor import DUTY, LAW, MODEL, RIG, Scene
 from upright.control.watch import HELD_BY, sticking
 from upright.errors import RigStopped
-from upright.experiments.worn import worn
+from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
 from upright.rigs.driven import LEAST_SWUNG, SWUNG, UNSEEN, WITHIN, StillDrive, StillPendulum
@@ -55,7 +55,7 @@ def test_a_pendulum_may_rest_on_a_body_that_goes_on_straight(speed):
 @pytest.mark.parametrize("channel", [0, 1])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_dead_encoder_stops_the_rig_within_its_travel(seed, channel):
-    scene = Scene(truth=worn(make_rig("furuta", seed), seed)).started(tilt=0.08)
+    scene = Scene(truth=nonideal(make_rig("furuta", seed), seed)).started(tilt=0.08)
     with pytest.raises(RigStopped, match="not a single count"):
         scene.run(4.0, then=lambda p: p.encoders.dead(channel))
     # with nobody beside it the loop lets it go 10 rad
@@ -67,7 +67,7 @@ def test_a_dead_encoder_stops_the_rig_within_its_travel(seed, channel):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_sound_rig_that_is_tapped_at_rest_is_not_stopped(seed, tap):
     """10 of 62 such runs were, as an encoder that shows not a single count (20 ms of stillness inside friction)."""
-    scene = Scene(truth=worn(make_rig("furuta", seed), seed)).started(tilt=0.01)
+    scene = Scene(truth=nonideal(make_rig("furuta", seed), seed)).started(tilt=0.01)
     scene.run(1.0)
     for sign in (1.0, -1.0):
         scene.port.push([0.0, sign * tap])
@@ -78,7 +78,7 @@ def test_a_sound_rig_that_is_tapped_at_rest_is_not_stopped(seed, tap):
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_worn_rig_that_is_pushed_is_not_stopped(seed):
-    scene = Scene(replace(DUTY, watch=False), worn(make_rig("furuta", seed), seed)).started(tilt=0.03, law=LAW)
+    scene = Scene(replace(DUTY, watch=False), nonideal(make_rig("furuta", seed), seed)).started(tilt=0.03, law=LAW)
     still, pendulum = StillDrive(RIG, "inverted"), StillPendulum(RIG, "inverted")
     tick = scene.rig.exchange(0.0)
     for k in range(2500):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -18,6 +18,7 @@ from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
+from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.lateness import lateness
@@ -49,6 +50,7 @@ from upright.identification.search.strategy import (
     simplex,
 )
 from upright.progress import Progress, silent
+from upright.workers import one_thread
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -63,6 +65,7 @@ LOWER = 2
 """How often a search is taken up again where the profile of an interval met a lower cost."""
 
 
+@one_thread()
 def identify(
     rig: GreyBox, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True,
     near: Fit | None = None,
@@ -135,7 +138,8 @@ def _identify(
             fit, rig, runs,
             lambda kept: _identify(rig, kept, method, progress, watch=False, near=fit, conventions=log.conventions),
         )  # fmt: skip
-        return fit if log.conventions() else with_proposal(fit, fitted)
+        explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
+        return fit if explained or log.conventions() else with_proposal(fit, fitted)
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
 
@@ -204,6 +208,11 @@ def _check(rig: GreyBox, runs: Sequence[Run], method: str) -> None:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")
 
 
+def least_explained(scores: Mapping[str, RunScore]) -> float:
+    """Least fit percent of a fitted signal."""
+    return min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
+
+
 def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
     """What an interrupted fit says nothing of, so that nobody takes silence for "looked at, and found nothing"."""
     return (
@@ -257,15 +266,15 @@ def _conclude(
         estimates = with_model_uncertainty(estimates, best, asked, left_out, log)
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
-    scores = _scores(best, scored, estimates, groups, bands, log)
+    ahead = None if best.lost else judged(problem, best.x)
+    scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
     skipped = _skipped(runs, watch=watch) if found.interrupted else ()
     if skipped:
         warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
     elif len(scored) < len(runs):
         warnings.append("What was held out is not predicted, because the fit failed.")
     unseen = () if best.lost else seen.sentences({n: p.unit for n, p in asked.parameters.items()})
-    worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
-    conventions = tuple(log.conventions()) if worst < GOOD else ()
+    conventions = tuple(log.conventions()) if least_explained(scores) < GOOD else ()
     assumed = assumptions(best, estimates, evaluate=not brief)
     estimates = with_assumptions(estimates, assumed)
     late = None if brief or little or conventions else lateness(best)
@@ -284,6 +293,7 @@ def _conclude(
             bent=late.bent if late else (),
             period=min(t.period for t in problem.tracks),
             standing=None if brief or seen.hidden else standing(best),
+            judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
@@ -320,13 +330,13 @@ def _conclude(
 
 def _scores(
     best: Optimum, runs: Sequence[Run], estimates: dict[str, Estimate], groups: dict[str, dict[str, Estimate]],
-    bands: Bands | None, log: SearchLog,
+    bands: Bands | None, log: SearchLog, ahead: float | None,
 ) -> dict[str, RunScore]:  # fmt: skip
     problem, rig = best.problem, best.problem.rig
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    found = {run.label: score_run(whole, i, best.x) for i, run in enumerate(fitted)}
+    found = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     foreseen = [r for r in runs if r.role != "fit"]

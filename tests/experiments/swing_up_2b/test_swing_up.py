@@ -54,7 +54,7 @@ def test_every_lie_is_told_before_a_loop_is_closed_or_falls(done):
     assert len(done.lies) == len(LIES)
     for lie in done.lies:
         assert lie.refused
-        assert lie.found == pytest.approx(lie.factor, rel=0.02)
+        assert lie.estimate == pytest.approx(lie.factor, rel=0.02)
         if math.isfinite(lie.fell):
             assert lie.spoke < lie.fell
     assert any(math.isfinite(lie.fell) for lie in done.lies)

@@ -13,7 +13,7 @@ from upright.control import trial
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
-from upright.experiments.tracking_3.run import RESERVE, asked_of, attempt, choose_step, run_tracking
+from upright.experiments.tracking_3.run import RESERVE, attempt, choose_step, levels_of, run_tracking
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
 from upright.gains.loop import swing
@@ -122,7 +122,9 @@ def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     model = rig.linear(AT)
     base = paper_sets(rig, (4,))[0]
     law = with_sum(rig, base, "")
-    assert law.k_pf == pytest.approx(prefilter(model.A, model.B, model.C[-1], place(model.A, model.B, base.asked).K))
+    assert law.k_pf == pytest.approx(
+        prefilter(model.A, model.B, model.C[-1], place(model.A, model.B, base.requested).K)
+    )
     step, pushes = 0.4 * rig.limit / law.k_pf, np.full(9000, 0.1 * rig.limit)
     ends = [
         trial(rig, one.law, at=AT, start=np.zeros(4), seconds=3.0, reference=np.full(1, step), pushes=pushes).x[-1, 2]
@@ -191,7 +193,7 @@ def test_a_step_is_followed_by_a_push_of_a_tenth_of_the_drive_s_limit_against_it
     """0.1 s of rest, 2 s of the step alone, 1.5 s of step and push; the rig's own limit, whatever its unit."""
     rig = make_rig(kind)
     for limit in (rig.limit, 3 * rig.limit):
-        reference, pushes = asked_of(rig.replace(limit=limit), 0.02)
+        reference, pushes = levels_of(rig.replace(limit=limit), 0.02)
         t = np.arange(reference.size) * rig.period
         assert t[-1] == pytest.approx(3.6, abs=rig.period)
         half = rig.period / 2  # steps come at the nearest tick

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Optimum, student
 from upright.identification.inference.loop import matrix_root
 from upright.identification.inference.reach import beyond, reached
@@ -85,9 +86,12 @@ def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
 
 def calibrated(best: Optimum) -> Bands | None:
     """Bands that a fit promises, from blocks of its runs predicted by fits of the others; None where one runs away."""
-    problem = best.problem
+    if best.lost:
+        return None
+    horizon = judged(best.problem, best.x)
+    problem = best.problem if horizon is None else best.problem.ahead(horizon.seconds)
     met = [sensitivity(problem, i, best.x) for i in range(len(problem.tracks))]
-    if best.lost or not all(run.finite for run in met):
+    if not all(run.finite for run in met):
         return None
     blocks = _blocks(best)
     moved = np.array([block.step for block in blocks]).reshape(-1, best.x.size)
@@ -99,7 +103,7 @@ def calibrated(best: Optimum) -> Bands | None:
         spreads=_spreads(problem.tracks, met),
         names=tuple(problem.unknowns[i].name for i in shared),
         covariance=possible(covariance[np.ix_(shared, shared)] * np.outer(slope, slope)),
-        reached=reached(problem.rig, [track.run for track in problem.tracks]),
+        reached=reached(problem.rig, [track.run for track in best.problem.tracks]),
     )
     missed = [_missed(problem, met[block.run], block, covariance, best.x, bands) for block in blocks]
     if len(blocks) < 2:
@@ -294,9 +298,11 @@ def banded(
         names = []
     uncertain = {n: replace(rig.parameters[n], estimate=True) for n in names}
     problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, given=groups)
+    if run.filtered and plain.horizon is not None:
+        problem = problem.ahead(plain.horizon)
     track, x = problem.tracks[0], problem.place(own)
     variance = np.zeros(plain.y.shape)
-    age = np.full(len(plain.y), next(iter(run.horizons), 0.0))
+    age = np.full(len(plain.y), plain.horizon or 0.0)
     if not run.filtered:
         problem.settle_steps(x)
         met = sensitivity(problem, 0, x)

@@ -9,7 +9,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from upright.basis import NOT_SUPPORTED, in_percent
 from upright.identification.inference.assumptions import proportional, resting
+from upright.identification.inference.ceiling import ENOUGH, Judged
 from upright.identification.inference.loop import Standing
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.grey_box import GreyBox
@@ -26,6 +28,9 @@ MARGIN = 2.0
 
 VAGUE = 10.0
 """An interval of a positive number whose ends are this many times apart leaves it undetermined."""
+
+VANISHED = 1e-6
+"""Share of its guess below which a mass has vanished: no guess of a rig's is a million times too large."""
 
 ESSENTIAL = ("J_", "m_", "k_", "l_", "actuator.gain")
 """Numbers without which a model is none: inertias, stiffnesses, lengths, the drive; friction is often vague."""
@@ -47,7 +52,8 @@ class Evidence:
 
     `unseen` and `conventions` are sentences on what the data cannot see and on signs or zeros that look wrong. The
     residuals are autocorrelated over `memory` seconds, the motion takes `period` seconds for one period. `standing`
-    says how a rig within the intervals stands upright, if this plant can, `driven` whether a command acted in a run.
+    says how a rig within the intervals stands upright, if this plant can, `judged` how far ahead runs count that a
+    filter predicts, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
     more than they vary.
@@ -64,6 +70,7 @@ class Evidence:
     memory: float
     period: float
     standing: Standing | None
+    judged: Judged | None = None
     driven: bool = True
     bent: Sequence[str] = ()
     lost: Sequence[str] = ()
@@ -73,7 +80,7 @@ class Evidence:
 def judge(found: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(found)
-    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
+    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found, supported=predicts.answer != "no")
     if found.interrupted:
         return predicts, *map(_not_evaluated, others)
     if predicts.answer != "no":
@@ -121,10 +128,10 @@ def _predicts(found: Evidence) -> Judgement:
         against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
     against += [s[0].upper() + s[1:] for s in found.conventions]
     blank = uninformative(found.runs)
-    explains = f"It explains {_range(fitted)} of the fitted runs. " if fitted else ""
+    explains = f"It explains {_ranges(found.runs, 'fit')} of the fitted runs. " if fitted else ""
     if blank and len(blank) == sum(len(s.fit_percent) for s in found.runs.values()):
         against.append("No run is predicted far enough ahead to test the model.")
-    notes: list[str] = []
+    notes: list[str] = [] if found.judged is None else _horizon(found.judged, found.runs)
     if blank:
         where = ", ".join(f"{label} {signal} at {found.runs[label].horizon:g} s" for label, signal in blank)
         notes.append(
@@ -148,7 +155,7 @@ def _predicts(found: Evidence) -> Judgement:
             advice="Hold a run or a tail out (role = \"predict\", or --hold-out).", reasons=tuple(notes),
         )  # fmt: skip
     part = "in part" if blank else "yes"
-    headline = f"{explains}It predicts {_range(predicted)} of runs it has not seen{_beside(found.runs)}."
+    headline = f"{explains}It predicts {_ranges(found.runs, 'predict')} of runs it has not seen{_beside(found.runs)}."
     beaten = _beaten(found.runs)
     if beaten:
         notes.append(
@@ -156,6 +163,34 @@ def _predicts(found: Evidence) -> Judgement:
             "model misses something that these data show."
         )
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
+
+
+def _horizon(judged: Judged, runs: Mapping[str, RunScore]) -> list[str]:
+    """Why runs are judged so far ahead, and what the start state alone leaves further on."""
+    allowed: dict[float, list[float]] = {}
+    reached: dict[float, list[float]] = {}
+    for s in runs.values():
+        for horizon, percents in s.ceiling.items():
+            allowed.setdefault(horizon, []).extend(percents.values())
+            reached.setdefault(horizon, []).extend(s.ahead[horizon].values())
+    if not allowed:
+        return []
+    least = min(allowed[judged.seconds], default=ENOUGH)
+    ms = _seconds(judged.seconds)
+    falls = "" if not judged.growth else f": the plant falls by e in {1e3 / judged.growth:.2g} ms"
+    if least < ENOUGH:
+        return [
+            f"No horizon tests this model{falls}, and already {ms} ahead the start state, known no better than the "
+            f"sensors allow, limits any model to {least:.0f} %. Let it move more, or measure it finer."
+        ]
+    further = [h for h in allowed if h > judged.seconds * (1 + 1e-9)]
+    if not further:
+        return []
+    h = max(further)
+    return [
+        f"It is judged {ms} ahead{falls}, and further on any model misses by what its start state is unknown: at "
+        f"{_seconds(h)} that allows {min(allowed[h]):.0f} %, and {min(reached[h]):.0f} % are reached."
+    ]
 
 
 def _failure(lost: Sequence[str]) -> str:
@@ -192,7 +227,14 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     for n, e in asked.items():
         low, high = e.interval
         limit = found.rig.bounds(n) if n in found.rig.parameters else (-math.inf, math.inf)
-        if e.status == "at bound" and e.value != 0:
+        if _vanished(found.rig, n, e):
+            no = True
+            reasons.append(
+                f"{n} went to nothing, {e.value:.1g} {e.unit}, from a guess of {found.rig.parameters[n].value:.2g}: a "
+                "degenerate optimum, so the other numbers are not the rig's either. Measure it or the drive's gain and "
+                "give that as known, and look at the drive's sign."
+            )
+        elif e.status == "at bound" and e.value != 0:
             no = True
             reasons.append(
                 f"{n} reached its {'lower' if e.value <= limit[0] else 'upper'} limit, {_shown(e.value, e)}: the data "
@@ -252,6 +294,12 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
 
 
+def _vanished(rig: GreyBox, name: str, e: Estimate) -> bool:
+    """Whether a mass, inertia, length or gain that cannot be zero was driven there."""
+    guess = rig.parameters[name].value if name in rig.parameters else 0.0
+    return name.startswith(("m_", "J_", "l_", "actuator.gain")) and 0 < abs(e.value) < VANISHED * abs(guess)
+
+
 def _lumped(rig: GreyBox) -> list[str]:
     """Numbers that stand for something else than their name, because another was set to zero."""
     p = rig.parameters
@@ -260,7 +308,7 @@ def _lumped(rig: GreyBox) -> list[str]:
     return []
 
 
-def _loop(found: Evidence) -> Judgement:
+def _loop(found: Evidence, *, supported: bool) -> Judgement:
     s = found.standing
     if found.lost:
         return Judgement(question=LOOP, answer="not tested", headline="Not evaluated: the fit failed.")
@@ -284,7 +332,11 @@ def _loop(found: Evidence) -> Judgement:
             advice="Add a run in which it acts.",
         )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
-    held = f"a loop whose poles are as fast as that holds {100 * s.share:.0f} % of the rigs within the intervals"
+    held = f"a loop with poles as fast as that stabilises {in_percent(s.share)} of the rigs within the intervals"
+    if not supported:
+        held = (
+            f"how many of the rigs within the intervals a loop with poles as fast as that stabilises is {NOT_SUPPORTED}"
+        )
     answer = "no"
     if half <= NARROW and s.share >= SURE:
         answer = "yes"
@@ -304,14 +356,13 @@ def _shown(value: float, e: Estimate) -> str:
 
 
 def _percents(runs: Mapping[str, RunScore], role: str) -> dict[str, float]:
-    """Fit percent by run and signal, of several horizons the worst, since that is the one asked for last."""
-    found: dict[str, float] = {}
-    for label, s in runs.items():
-        if s.role == role:
-            for signal, percent in s.fit_percent.items():
-                every = [percents[signal] for percents in s.ahead.values() if signal in percents]
-                found[f"{label} {signal}"] = min([percent, *every])
-    return found
+    """Fit percent by run and signal, of what a filter predicts as far ahead as it is judged."""
+    return {
+        f"{label} {signal}": percent
+        for label, s in runs.items()
+        if s.role == role
+        for signal, percent in s.fit_percent.items()
+    }
 
 
 def _beside(runs: Mapping[str, RunScore]) -> str:
@@ -353,6 +404,24 @@ def uninformative(runs: Mapping[str, RunScore]) -> list[tuple[str, str]]:
 def _range(percents: Mapping[str, float]) -> str:
     low, high = (f"{p:.1f}" for p in (min(percents.values()), max(percents.values())))
     return f"{low} %" if low == high else f"{low} to {high} %"
+
+
+def _ranges(runs: Mapping[str, RunScore], role: str) -> str:
+    """Ranges of the fit percents of runs with a role, those of free runs and of every horizon by themselves."""
+    kinds: dict[float, dict[str, float]] = {}
+    for label, s in runs.items():
+        if s.role == role:
+            percents = {f"{label} {signal}": p for signal, p in s.fit_percent.items()}
+            kinds.setdefault(s.horizon or 0.0, {}).update(percents)
+    free = "" if len(kinds) == 1 else " in free runs"
+    return " and ".join(
+        f"{_range(percents)}{f' {_seconds(horizon)} ahead' if horizon else free}"
+        for horizon, percents in sorted(kinds.items()) if percents
+    )  # fmt: skip
+
+
+def _seconds(horizon: float) -> str:
+    return f"{1e3 * horizon:.3g} ms" if horizon < 0.3 else f"{horizon:.3g} s"
 
 
 def _worse(runs: Mapping[str, RunScore]) -> list[str]:

@@ -218,6 +218,13 @@ def restart_states(
 
 def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int) -> list[Array]:
     """Kalman gains (outputs, states, lanes) at the samples of a stretch, until they have settled; the first is zero."""
+    return filtering(solver, track, values, steps, lanes)[0]
+
+
+def filtering(
+    solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int
+) -> tuple[list[Array], Array]:
+    """As `gains`, and the covariance (lanes, S, S) of states and drifts of the inputs that they leave at the last."""
     Phi, Q = discrete_model(solver, track, values, lanes)
     plan = _plan(track)
     n = Phi.shape[1]
@@ -238,10 +245,11 @@ def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], 
         new = keep @ ahead @ keep.transpose(0, 2, 1) + L @ R @ L.transpose(0, 2, 1)  # Joseph: stays positive
         found.append(L)
         size = np.sqrt(np.maximum(np.einsum("lii->li", new), 0.0)) + 1e-300  # lanes of impossible numbers run away
-        if not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :]):
-            break
+        same = not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :])
         P = new
-    return [np.ascontiguousarray(L.transpose(2, 1, 0)) for L in found]
+        if same:
+            break
+    return [np.ascontiguousarray(L.transpose(2, 1, 0)) for L in found], P
 
 
 def discrete_model(
