@@ -102,7 +102,8 @@ SOUND = tuple(
            tell=in_loop(lambda s: None, after=1.0, taps=speed)) for speed in (0.5, 1.0, 2.0)
 )  # fmt: skip
 ENCODERS = (
-    Hazard(what="pendulum's encoder dead, moving", by=F.ENCODER | F.MODEL, tell=in_loop(lambda s: s.on.encoders.dead(1))),
+    Hazard(what="pendulum's encoder dead, moving", by=F.ENCODER | F.MODEL,
+           tell=in_loop(lambda s: s.on.encoders.dead(1))),
     Hazard(what="pendulum's encoder dead, at rest, then a tap of 1 rad/s", by=F.ENCODER | F.MODEL | F.OVERTRAVEL,
            tell=in_loop(lambda s: s.on.encoders.dead(1), after=STILL, tilt=0.0, taps=1.0)),
     Hazard(what="arm's encoder dead, moving", by=F.ENCODER | F.MODEL,

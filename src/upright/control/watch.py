@@ -42,7 +42,7 @@ FACTORS = (0.0, -1.0, 0.25, 0.5, 2.0, 4.0)
 """What a suspected encoder may show over what is true: dead, swapped channels, quadrature counted otherwise."""
 STRENGTHS = (0.25, 0.5)
 """What a suspected drive may give over what is asked of it: a supply that is down, a phase that is off."""
-CORNER, SLOWEST, MEMORY = 60.0, 4.0, 0.25
+CORNER, SLOWEST, MEMORY = 60.0, 4.0, 0.5
 """Corner of the low-pass [rad/s]; motions slower than the second are not looked at for factors, since a hand that
 leans on something is slow; and how long evidence is remembered [s]."""
 TAIL, RELATIVE = 2.0, 0.1
@@ -53,9 +53,9 @@ HELD_BY, DRY = 2.0, 0.01
 """A body is held at most by so many times the dry friction that the model knows of; where it knows of none, by such a
 share of the largest command."""
 BOUNDS = {
-    ("body", 0.0): 5.0, ("body", -1.0): 6.0, ("body", 0.25): 6.5, ("body", 0.5): 5.5, ("body", 2.0): 17.0,
-    ("body", 4.0): 18.0, ("other", 0.0): 10.0, ("other", -1.0): 6.5, ("other", 0.25): 17.0, ("other", 0.5): 17.0,
-    ("other", 2.0): 5.0, ("other", 4.0): 6.5, ("drive", 0.25): 4.6, ("drive", 0.5): 4.6,
+    ("body", 0.0): 5.0, ("body", -1.0): 6.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
+    ("body", 4.0): 20.0, ("other", 0.0): 12.0, ("other", -1.0): 7.0, ("other", 0.25): 19.0, ("other", 0.5): 19.0,
+    ("other", 2.0): 5.5, ("other", 4.0): 7.0, ("drive", 0.25): 4.6, ("drive", 0.5): 4.6,
 }  # fmt: skip
 """Logarithms of the odds at which a suspicion is believed: those that a Gumbel distribution of the largest in 50 s,
 fitted to 0.8 hours of each of two makes, worn, tapped and pushed, passes once in some 300 hours; at least ln 100. A
@@ -63,7 +63,7 @@ hand at the pendulum that a law answers looks as if theta showed too little, or 
 ones. `python -m benchmarks false_stops` is 10 hours of other rigs."""
 LEADS = 4.0
 """Logarithm of the odds by which the best suspicion leads the next when it is named."""
-PATIENCE = 0.1
+PATIENCE = 0.3
 """How long it may take to find out which [s]."""
 SAFE = math.radians(6)
 """Lean [rad] beyond which nobody waits to find out."""
