@@ -211,7 +211,7 @@ def response_of_logs(
 def _designed(wish: LogRequest) -> GreyBox:
     """Numbers of a make: as designed where nothing is said, known within a tolerance where the bench usually tells."""
     make = make_named(wish.make)
-    values = make.plant.parameters()
+    values = make.rig.plant.parameters()
     for name in wish.known:
         if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):
             raise BadInput(f"'{wish.make}' has no number '{name}'; {nearest(name, values)}")

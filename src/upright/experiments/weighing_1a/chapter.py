@@ -17,7 +17,7 @@ from upright.records import Record
 from upright.report.fit.tables import finding, interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import number, typed, unit, with_error
-from upright.rig.makes import OSCILLATORS, Make
+from upright.rig.makes import BODIES, Make
 
 QUESTION = (
     "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "
@@ -30,7 +30,7 @@ MOST_PANELS = 6
 def chapter(done: Weighing) -> Chapter:
     """Experiment 1a on a rig, beside the truth of a twin."""
     campaign = done.campaign
-    found, body = campaign.loadings, OSCILLATORS[campaign.kind]
+    found, body = campaign.loadings, BODIES[campaign.kind]
     told = loading_chapter(
         found, kind=campaign.kind, title="Stiffness and inertia from added loads", logs=campaign.logs,
         signals={label: record.outputs[0] for label, record in campaign.logs.items()}, left_out=campaign.left_out,
@@ -67,7 +67,7 @@ def _later_chapter(done: Weighing, make: Make, weighed: Chapter) -> Chapter:
         f"{len(campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
         "friction, encoder counts and converter steps are as on the rig."
     )
-    named = (("k", found.k), (OSCILLATORS[campaign.kind].bare, found.bare), ("c", found.damping))
+    named = (("k", found.k), (BODIES[campaign.kind].bare, found.bare), ("c", found.damping))
     handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(done, k)} for k in done.known}
     return replace(
         weighed,
@@ -107,7 +107,7 @@ def _sentence(done: Weighing, k: Known) -> str:
 
 
 def _steps(done: Weighing) -> tuple[Step, ...]:
-    campaign, body = done.campaign, OSCILLATORS[done.campaign.kind]
+    campaign, body = done.campaign, BODIES[done.campaign.kind]
     if done.make is not None:
         first = [label for label in campaign.files if label.endswith("run 1")]
         files = " ".join(typed(done.folder / campaign.files[label]) for label in first)
@@ -132,7 +132,7 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
 
 def added_options(campaign: Campaign, labels: Iterable[str]) -> str:
     """Loadings of some logs as the command line takes them."""
-    return " ".join(f'--added "{campaign.added[n]:.6g} {OSCILLATORS[campaign.kind].unit}"' for n in labels)
+    return " ".join(f'--added "{campaign.added[n]:.6g} {BODIES[campaign.kind].unit}"' for n in labels)
 
 
 def loading_chapter(
@@ -185,7 +185,7 @@ def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Tabl
     """What was found, beside the truth where a twin tells it."""
     named = (
         ("k", "stiffness", found.k, "stiffness"),
-        (OSCILLATORS[kind].bare, "inertia of the bare body", found.bare, "inertia"),
+        (BODIES[kind].bare, "inertia of the bare body", found.bare, "inertia"),
         ("c", "viscous friction", found.damping, "damping"),
     )
     rows = tuple(
@@ -253,5 +253,5 @@ def _swing_pictures(found: Loadings, logs: Mapping[str, Record], signals: Mappin
 
 
 def _unit(kind: str, what: str) -> str:
-    body = OSCILLATORS[kind]
-    return body.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit
+    body = BODIES[kind]
+    return body.rig.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit
