@@ -1,6 +1,6 @@
 """How fast is it, beside what? `python -m benchmarks [NAMES] [--json FILE] [--quick] [--full]`.
 
-`python -m benchmarks mutants --sample 150 --seed N` asks which changes of the code the quick tests notice.
+`python -m benchmarks mutants --sample 150 --seed N` asks which changes of the code the tests notice.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ APART = ("mutants",)
 """Those that run when they are named, and never among all: what is asked there is not how fast."""
 PUBLISHED = (
     "first", "kept", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers",
-    "crash", "safety", "soak", "jitter", "gym",
+    "crash", "safety", "soak", "jitter", "gym", "mutants",
 )  # fmt: skip
 SHARED = (
     "first", "kept", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts",
@@ -121,6 +121,9 @@ def main(arguments: list[str] | None = None) -> int:
         help="only changes of a room, a file or a line: identification/ladder, gains/lqr.py:141",
     )
     changes.add_argument(
+        "--slow", action="store_true", help="what no quick test notices is put to the slow tests that cover it, 120 s"
+    )
+    changes.add_argument(
         "--map",
         type=Path,
         metavar="FOLDER",
@@ -151,7 +154,7 @@ def main(arguments: list[str] | None = None) -> int:
         "starts": {"starts": asked.starts},
         "mutants": {
             "sample": asked.sample, "seed": asked.seed, "within": asked.within, "folder": asked.map,
-            "verdicts": asked.judged, "workers": asked.workers or 2,
+            "verdicts": asked.judged, "workers": asked.workers or 2, "slow": asked.slow,
         },
     }  # fmt: skip
     for name in asked.names or [name for name in NAMES if name not in APART]:

@@ -68,10 +68,13 @@ class Board:
 
 
 def rig_on(line: str | Line, **how: Any) -> SerialRig:
-    """A rig with ECP's encoders and converter at the end of a line, as patient as a busy machine needs."""
+    """A rig with ECP's encoders and converter at the end of a line, as patient as a busy machine needs.
+
+    It is greeted alike each time: how long a processor takes over a frame depends on its bytes.
+    """
     same: dict[str, Any] = {
         "coordinates": ("psi", "theta"), "counts": (COUNTS, COUNTS), "command_unit": "V", "full_scale": FULL_SCALE,
-        "patience": 20.0,
+        "patience": 20.0, "nonce": lambda: 1,
     }  # fmt: skip
     return SerialRig(line, **{**same, **how})
 

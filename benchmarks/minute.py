@@ -54,7 +54,7 @@ def _line(folder: Path, what: str, mode: Mode, law: Law, seconds: float, *, most
     runs: list[NDArray[np.int64]] = []
     lost, longest = 0, 0.0
     for _ in range(2):
-        board = Board(folder / "simrig", folder / "atmega2560.elf", *UPRIGHT)
+        board = Board(folder / "simrig", folder / "atmega2560-analog.elf", *UPRIGHT)
         rows, rig = held(board, mode, law, seconds, KICKS, lockstep=True)
         runs.append(rows)
         lost, longest = lost + rig.snapshot().lost, max(longest, board.state()[7])

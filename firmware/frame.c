@@ -16,36 +16,41 @@ uint32_t crc32_of(const uint8_t *bytes, uint16_t n) {
     return ~r;
 }
 
-/* Decodes COBS in place, which only ever moves bytes forward; returns the length, 0 when malformed. */
-static uint16_t unstuff(uint8_t *bytes, uint16_t n) {
-    uint16_t in = 0, out = 0;
-    while (in < n) {
-        uint8_t code = bytes[in++];
-        if (in + code - 1 > n) return 0;
-        for (uint8_t i = 1; i < code; i++) bytes[out++] = bytes[in++];
-        if (code < 0xFF && in < n) bytes[out++] = 0;
+/* Of a payload with its own CRC behind it, whatever the payload is. */
+#define REMAINDER_OF_SOUND 0xDEBB20E3UL
+
+static void take(receiver_t *receiver, uint8_t byte) {
+    if (receiver->n == sizeof receiver->bytes) {
+        receiver->overflowed = 1;
+        return;
     }
-    return out;
+    receiver->bytes[receiver->n++] = byte;
+    receiver->remainder = (receiver->remainder >> 8) ^ remainder_of[(uint8_t)receiver->remainder ^ byte];
 }
 
 uint16_t frame_receive(receiver_t *receiver, uint8_t byte) {
     if (byte) {
-        if (receiver->n < sizeof receiver->bytes) receiver->bytes[receiver->n++] = byte;
-        else receiver->overflowed = 1;
+        if (receiver->left) {
+            receiver->left--;
+            take(receiver, byte);
+            return 0;
+        }
+        if (!receiver->begun) {
+            receiver->begun = 1;
+            receiver->remainder = 0xFFFFFFFFUL;
+        } else if (!receiver->full) {
+            take(receiver, 0);
+        }
+        receiver->left = byte - 1;
+        receiver->full = byte == 0xFF;
         return 0;
     }
+    if (!receiver->begun) return 0; /* zeros between frames are allowed */
     uint16_t n = receiver->n;
-    uint8_t overflowed = receiver->overflowed;
+    uint8_t spoiled = receiver->overflowed || receiver->left || receiver->remainder != REMAINDER_OF_SOUND;
     receiver->n = 0;
-    receiver->overflowed = 0;
-    if (n == 0 && !overflowed) return 0; /* zeros between frames are allowed */
-    n = overflowed ? 0 : unstuff(receiver->bytes, n);
-    if (n > CRC_BYTES) {
-        n -= CRC_BYTES;
-        const uint8_t *end = receiver->bytes + n;
-        uint32_t sent = end[0] | (uint32_t)end[1] << 8 | (uint32_t)end[2] << 16 | (uint32_t)end[3] << 24;
-        if (sent == crc32_of(receiver->bytes, n)) return n;
-    }
+    receiver->begun = receiver->left = receiver->overflowed = 0;
+    if (!spoiled && n > CRC_BYTES) return n - CRC_BYTES;
     receiver->dropped++;
     return 0;
 }
@@ -53,7 +58,8 @@ uint16_t frame_receive(receiver_t *receiver, uint8_t byte) {
 uint16_t frame_make(uint8_t *payload, uint16_t n, uint8_t frame[FRAME_MOST]) {
     uint32_t crc = crc32_of(payload, n);
     for (uint8_t i = 0; i < CRC_BYTES; i++, crc >>= 8) payload[n++] = (uint8_t)crc;
-    uint16_t out = 1, code_at = 0;
+    uint16_t out = 2, code_at = 1;
+    frame[0] = 0;
     for (uint16_t in = 0; in < n; in++) {
         if (payload[in]) {
             frame[out++] = payload[in];

@@ -26,12 +26,15 @@ static bool power;
 uint32_t port_counts(uint8_t channel) { return counts[channel]; }
 uint16_t port_illegal(void) { return illegal; }
 void port_command(int16_t steps) { command = steps; }
+bool port_settled(void) { return true; }
 void port_enable(bool on) { power = on; }
 uint8_t port_reset_cause(void) { return 0; }
+uint32_t port_boot(void) { return 0; }
 uint32_t port_lock(void) { return 0; }
 void port_unlock(uint32_t before) { (void)before; }
 
-static int16_t limit; /* as the firmware told that it holds it */
+static int16_t limit;    /* as the firmware told that it holds it */
+static uint16_t session; /* of its last answer */
 
 static void claim(bool held, const char *what) {
     if (!held) fprintf(stderr, "not so: %s\n", what), abort();
@@ -42,8 +45,9 @@ void port_send(const uint8_t *bytes, uint16_t n) {
     for (uint16_t i = 0; i < n; i++) {
         uint16_t payload = frame_receive(&host, bytes[i]);
         claim(payload || i + 1 < n, "every frame that is sent is sound");
-        if (payload && host.bytes[0] == (CONFIGURE | REPLY) && host.bytes[2] == DONE)
-            limit = (int16_t)get_u16(host.bytes + 52);
+        if (payload) session = get_u16(host.bytes + 2);
+        if (payload && host.bytes[0] == (CONFIGURE | REPLY) && host.bytes[4] == DONE)
+            limit = (int16_t)get_u16(host.bytes + 54);
     }
 }
 
@@ -55,6 +59,8 @@ static void check(void) {
     claim(command <= limit && command >= -limit, "the command stays within its limit");
 }
 
+#define HEAD 4 /* kind, sequence, session */
+
 static void ask(uint8_t *payload, size_t n) {
     uint8_t frame[FRAME_MOST];
     uint16_t length = frame_make(payload, (uint16_t)n, frame);
@@ -64,33 +70,38 @@ static void ask(uint8_t *payload, size_t n) {
 /* Requests as a host makes them, so that the fuzzer need not find lengths and ages by chance. */
 static size_t proper(uint8_t *payload, size_t n, uint32_t tick) {
     static const uint8_t body[] = {
-        [HELLO] = 1, [CONFIGURE] = 44, [SELF_TEST] = 4, [START] = 1, [EXCHANGE] = 8, [LAW] = LAW_BYTES, [SNAPSHOT] = 0,
+        [HELLO] = 5, [CONFIGURE] = 44, [SELF_TEST] = 4, [START] = 1, [EXCHANGE] = 8, [LAW] = LAW_BYTES, [SNAPSHOT] = 0,
     };
     payload[0] = 1 + payload[0] % SNAPSHOT;
-    if (n < 2 + (size_t)body[payload[0]]) memset(payload + n, 0, 2 + body[payload[0]] - n);
-    if (payload[0] == EXCHANGE) put_u16(payload + 8, (uint16_t)tick);
-    return 2 + body[payload[0]];
+    if (n < HEAD + (size_t)body[payload[0]]) memset(payload + n, 0, HEAD + body[payload[0]] - n);
+    put_u16(payload + 2, session);
+    if (payload[0] == EXCHANGE) put_u32(payload + HEAD + 4, tick);
+    return HEAD + body[payload[0]];
+}
+
+/* The request of this kind, in the session that the firmware told last. */
+static void ask_now(uint8_t *payload, enum request kind, size_t n) {
+    payload[0] = kind;
+    put_u16(payload + 2, session);
+    ask(payload, HEAD + n);
 }
 
 static void begin(enum mode mode) {
-    uint8_t payload[PAYLOAD_MOST + CRC_BYTES] = {CLEAR};
-    ask(payload, 2);
-    payload[0] = CONFIGURE;
-    for (int i = 0; i < 10; i++) put_u32(payload + 2 + 4 * i, i == 6 || i == 7 ? 50 : 1000);
-    put_u16(payload + 42, 20);
-    put_u16(payload + 44, 3000);
-    ask(payload, 46);
-    payload[0] = ARM;
-    ask(payload, 2);
-    memset(payload, 0, sizeof payload);
-    payload[0] = LAW; /* 10 steps for each count of encoder 1 */
-    put_float(payload + 2 + 4 * (COMMAND_ROW * INPUTS + MEMORIES), 10);
-    put_u16(payload + 2 + LAW_BYTES - 4, 32767);
-    payload[2 + LAW_BYTES - 1] = 1;
-    ask(payload, 2 + LAW_BYTES);
-    payload[0] = START;
-    payload[2] = mode;
-    ask(payload, 3);
+    uint8_t payload[PAYLOAD_MOST + CRC_BYTES] = {0}, *body = payload + HEAD;
+    ask_now(payload, HELLO, 5);
+    ask_now(payload, CLEAR, 0);
+    for (int i = 0; i < 10; i++) put_u32(body + 4 * i, i == 6 || i == 7 ? 50 : 1000);
+    put_u16(body + 40, 20);
+    put_u16(body + 42, 3000);
+    ask_now(payload, CONFIGURE, 44);
+    ask_now(payload, ARM, 0);
+    memset(payload, 0, sizeof payload); /* 10 steps for each count of encoder 1 */
+    put_float(body + 4 * (COMMAND_ROW * INPUTS + MEMORIES), 10);
+    put_u16(body + LAW_BYTES - 4, 32767);
+    body[LAW_BYTES - 1] = 1;
+    ask_now(payload, LAW, LAW_BYTES);
+    body[0] = mode;
+    ask_now(payload, START, 1);
     claim(rig_mode() == mode, "a rig that was cleared, configured and armed can be started");
 }
 

@@ -17,18 +17,41 @@ static bool begun;
 
 /* Whether one count of a reading moves the command by less than all that it may be, at once or through the memories,
  * which are at zero before or begun by that count. With n memories a count reaches the command within n samples or
- * never: A^n is a sum of lower powers (Cayley and Hamilton), so that C A^k B is zero for every k if it is for k < n. */
-static bool moderate(const law_t *law, uint8_t reading, bool begins, int16_t most) {
+ * never: A^n is a sum of lower powers (Cayley and Hamilton), so that C A^k B is zero for every k if it is for k < n.
+ * A count that is held shows what memories add up. */
+static bool moderate(const law_t *law, uint8_t reading, bool begins, bool held, int16_t most) {
     float z[MEMORIES], out[OUTPUTS];
     for (uint8_t i = 0; i < MEMORIES; i++) z[i] = begins ? law->begin[i][reading] : 0;
-    for (uint8_t k = 0; k <= MEMORIES; k++) {
+    for (uint8_t k = 0; k <= (held ? STEP_SAMPLES : MEMORIES); k++) {
         for (uint8_t row = 0; row < OUTPUTS; row++) {
-            out[row] = k ? 0 : law->matrix[row][MEMORIES + reading];
+            out[row] = k && !held ? 0 : law->matrix[row][MEMORIES + reading];
             for (uint8_t i = 0; i < MEMORIES; i++)
-                if (law->matrix[row][i] != 0) out[row] += law->matrix[row][i] * z[i];
+                if (!nothing(law->matrix[row][i])) out[row] += law->matrix[row][i] * z[i];
         }
         if (!(fabsf(out[COMMAND_ROW]) < most)) return false; /* nor what is no number */
         memcpy(z, out, sizeof z);
+    }
+    return true;
+}
+
+/* Whether the memories stand still or decay when nothing comes in. The trace of a power of A is the sum of the powers of
+ * its eigenvalues, whatever units the memories have; of a pair of them that the last power shows as cos = 0, the power
+ * before shows cos = +-1/sqrt(2). */
+static bool settles(const law_t *law) {
+    float power[MEMORIES][MEMORIES], square[MEMORIES][MEMORIES];
+    for (uint8_t i = 0; i < MEMORIES; i++) memcpy(power[i], law->matrix[i], sizeof power[i]);
+    for (uint8_t n = 1; n <= GROWTH_SQUARINGS; n++) {
+        float trace = 0;
+        for (uint8_t i = 0; i < MEMORIES; i++) {
+            for (uint8_t j = 0; j < MEMORIES; j++) {
+                square[i][j] = 0;
+                for (uint8_t k = 0; k < MEMORIES; k++)
+                    if (!nothing(power[i][k]) && !nothing(power[k][j])) square[i][j] += power[i][k] * power[k][j];
+            }
+            trace += square[i][i];
+        }
+        if (!(fabsf(trace) <= MEMORIES * GROWTH_MOST)) return false; /* nor what is no number */
+        memcpy(power, square, sizeof power);
     }
     return true;
 }
@@ -47,7 +70,10 @@ bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most) {
     offered.every = body[3];
     if (offered.every == 0 || offered.limit <= 0) return false;
     for (uint8_t i = 0; i < READINGS; i++)
-        if (!moderate(&offered, i, false, most) || !moderate(&offered, i, true, most)) return false;
+        if (!moderate(&offered, i, false, false, most) || !moderate(&offered, i, true, false, most) ||
+            !moderate(&offered, i, false, true, most))
+            return false;
+    if (!settles(&offered)) return false;
 
     *law = offered;
     uint8_t count = 0;

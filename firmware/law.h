@@ -12,6 +12,9 @@
 #define INPUTS (MEMORIES + READINGS + 1) /* memories, readings, one reference */
 #define OUTPUTS (MEMORIES + 1)           /* memories, the command */
 #define COMMAND_ROW MEMORIES
+#define STEP_SAMPLES 100     /* for which one count is held */
+#define GROWTH_SQUARINGS 9   /* 512 samples, */
+#define GROWTH_MOST 64       /* in which each of the law's modes may grow by that much: by e in 123 samples */
 
 /* Whether a number is one, and below 2^30 in size; by its bits, which costs a small processor far less than a float's
  * comparison. */
@@ -19,6 +22,12 @@ static inline bool sane(float value) {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
     return (bits & 0x7FFFFFFFUL) < 0x4E800000UL;
+}
+
+static inline bool nothing(float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return !(bits << 1);
 }
 
 typedef struct {
@@ -34,7 +43,8 @@ typedef struct {
 #define LAW_BYTES (4 * (OUTPUTS * INPUTS + READINGS + MEMORIES + MEMORIES * READINGS) + 4)
 
 /* Reads what came over the wire; false, and nothing taken over, when a number is not one or is absurd: a gain by which
- * one count more or less moves the command by all that it may be, at once or through the memories. */
+ * one count moves the command by all that it may be, in one sample or held for STEP_SAMPLES of them, at once or through
+ * the memories; or memories that grow by themselves (GROWTH_SAMPLES). src/upright/rigs/law.py says the same. */
 bool law_take(law_t *law, const uint8_t body[LAW_BYTES], int16_t most);
 void law_give(const law_t *law, uint8_t body[LAW_BYTES]);
 

@@ -14,9 +14,11 @@ extern const uint16_t port_steps;       /* of the converter from zero to full sc
 uint32_t port_counts(uint8_t channel);  /* of an encoder; runs over at 2^32 */
 uint16_t port_illegal(void);            /* quadrature transitions so far that no encoder makes */
 void port_command(int16_t steps);       /* to the converter */
+bool port_settled(void);                /* the converter puts out what it was last commanded */
 void port_enable(bool on);              /* power stage */
 void port_send(const uint8_t *bytes, uint16_t n);
 uint8_t port_reset_cause(void);         /* as the processor says it */
+uint32_t port_boot(void);               /* a number that hardly any two starts of the board share */
 
 /* No tick between the two. */
 uint32_t port_lock(void);

@@ -1,15 +1,17 @@
-/* Arduino Mega 2560 at 16 MHz: a tick of 1 kHz, two encoders, a 16-bit converter of +-10 V, the host at 1 Mbaud.
+/* Arduino Mega 2560 at 16 MHz: a tick of 1 kHz, two encoders, the host at 1 Mbaud; drive_analog.c or drive_pwm.c puts
+ * the command out. pins_atmega2560.h has the wires.
  *
- *     PB4, PB5 (10, 11)   encoder 1, A and B      PB1, PB2 (52, 51)   SCLK, SDI of an AD5761R
- *     PB6, PB7 (12, 13)   encoder 2, A and B      PB0 (53)            its SYNC
- *     PG5 (4)             power stage, high on    PE0, PE1 (0, 1)     host, through the board's USB
- *     PH3 (6)             LED: on while the power stage is, blinking in FAULT
- *
- * The power stage's line needs a resistor to ground: pins float during a reset. docs/firmware.md has the wiring. */
+ * The power stage's line needs a resistor to ground: pins float during a reset. docs/build.md has the wiring. */
+#ifndef __AVR_ATmega2560__
+#error "An Uno-class board (ATmega328P, 32U4) has 2 kB of memory, of which frames and limits alone take most, pin-change \
+interrupts on ports that Arduino spreads, and no third timer for PWM: take a Mega 2560 or a Pico."
+#endif
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/wdt.h>
 
+#include "drive.h"
+#include "pins_atmega2560.h"
 #include "port.h"
 #include "rig.h"
 
@@ -18,14 +20,22 @@
 #define TIMER_DIVIDER 8
 #define BLINK_TICKS 256 /* a power of two */
 
-const char port_name[] = "upright firmware, ATmega2560";
+#if DRIVE == DRIVE_ANALOG
+#define DRIVE_NAME "analog"
+#elif DRIVE == DRIVE_PAIR
+#define DRIVE_NAME "two PWM lines"
+#else
+#define DRIVE_NAME "PWM and sign"
+#endif
+const char port_name[] = "upright firmware, ATmega2560, " DRIVE_NAME;
 bool port_virtual = false;
 const uint16_t port_period = PERIOD_US;
-const uint16_t port_steps = 32768;
 
 /* Encoders: x4 decoding in one interrupt for both. */
 
 #define ENCODER_PINS 0xF0
+_Static_assert(BIT(ENCODER_1_A) == 4 && BIT(ENCODER_1_B) == 5 && BIT(ENCODER_2_A) == 6 && BIT(ENCODER_2_B) == 7,
+               "one interrupt reads the upper half of a port");
 static uint8_t read_phases(void) { return PINB >> 4; }
 enum { ILLEGAL = 2 };
 static const int8_t quadrature[16] = {0, 1, -1, ILLEGAL, -1, 0, ILLEGAL, 1, 1, ILLEGAL, 0, -1, ILLEGAL, -1, 1, 0};
@@ -63,66 +73,23 @@ uint16_t port_illegal(void) {
     return so_far;
 }
 
-/* The converter: frames of 24 bits, of which the first byte is the register. */
-
-#define WRITE_AND_UPDATE 0x03
-#define WRITE_CONTROL 0x04
-/* +-10 V, two's complement, internal reference, thermal shutdown on, middle of the range at power-up and CLEAR. */
-#define CONTROL 0x02E8
-
-/* One byte an interrupt, so that encoders are heard meanwhile; of commands that come during one the last one counts. */
-static volatile int16_t wanted, sending;
-static volatile uint8_t bytes_left;
-static volatile bool newer;
-
-static void send_command(void) {
-    newer = false;
-    sending = wanted;
-    bytes_left = 3;
-    PORTB &= (uint8_t)~_BV(PB0);
-    SPDR = WRITE_AND_UPDATE;
-}
-
-ISR(SPI_STC_vect) {
-    switch (--bytes_left) {
-    case 2: SPDR = (uint8_t)((uint16_t)sending >> 8); break;
-    case 1: SPDR = (uint8_t)sending; break;
-    default:
-        PORTB |= _BV(PB0);
-        if (newer) send_command();
-    }
-}
-
-void port_command(int16_t steps) {
-    uint32_t before = port_lock();
-    wanted = steps;
-    if (bytes_left) newer = true;
-    else send_command();
-    port_unlock(before);
-}
-
-static void prepare_converter(void) {
-    static const uint8_t bytes[] = {WRITE_CONTROL, CONTROL >> 8, CONTROL & 0xFF};
-    SPCR = _BV(SPE) | _BV(MSTR) | _BV(CPHA); /* the converter reads on the falling edge */
-    SPSR = _BV(SPI2X);
-    PORTB &= (uint8_t)~_BV(PB0);
-    for (uint8_t i = 0; i < sizeof bytes; i++) {
-        SPDR = bytes[i];
-        while (!(SPSR & _BV(SPIF))) {}
-    }
-    PORTB |= _BV(PB0);
-    (void)SPDR; /* clears the flag */
-    SPCR |= _BV(SPIE);
-}
+/* The power stage; in FAULT and IDLE it is switched off again at every tick. */
 
 void port_enable(bool on) {
-    if (on) {
-        PORTG |= _BV(PG5);
-        PORTH |= _BV(PH3);
-    } else {
-        PORTG &= (uint8_t)~_BV(PG5);
-        PORTH &= (uint8_t)~_BV(PH3);
+    if (on) HIGH(POWER_STAGE);
+    else LOW(POWER_STAGE);
+}
+
+static void show(uint32_t tick) {
+    static enum mode shown = FAULT;
+    enum mode mode = rig_mode();
+    if (mode == FAULT) {
+        if (!(tick & (BLINK_TICKS - 1))) TOGGLE(LED);
+    } else if (mode != shown) {
+        if (mode == IDLE) LOW(LED);
+        else HIGH(LED);
     }
+    shown = mode;
 }
 
 /* The host. */
@@ -154,6 +121,7 @@ void port_send(const uint8_t *bytes, uint16_t n) {
 /* Time. */
 
 static uint8_t reset_cause;
+static uint32_t boot __attribute__((section(".noinit")));
 static uint32_t tick;
 static volatile bool ticking;
 
@@ -169,6 +137,7 @@ void port_unlock(uint32_t before) {
 }
 
 uint8_t port_reset_cause(void) { return reset_cause; }
+uint32_t port_boot(void) { return boot; }
 
 /* The tick lets encoders and the wire interrupt it; what it may not do is to interrupt itself. The watchdog is fed by
  * ticks that come to their end. */
@@ -183,7 +152,7 @@ ISR(TIMER1_COMPA_vect) {
     sei();
     rig_tick(tick, late);
     cli();
-    if (rig_mode() == FAULT && !(tick & (BLINK_TICKS - 1))) PINH = _BV(PH3); /* toggles it */
+    show(tick);
     wdt_reset();
     ticking = false;
 }
@@ -192,18 +161,24 @@ ISR(TIMER1_COMPA_vect) {
 static uint8_t cause_at_reset __attribute__((section(".noinit")));
 void before_main(void) __attribute__((naked, used, section(".init3")));
 void before_main(void) {
+    OUTPUT(POWER_STAGE); /* low, as every output is by now */
     cause_at_reset = MCUSR;
     MCUSR = 0;
     wdt_disable();
+    /* what memory holds before it is cleared: noise of its cells when power comes, the last run's numbers otherwise; in
+     * 1 ms, as two sums of every fourth word */
+    uint16_t sum = (uint16_t)boot + 1, sums = (uint16_t)(boot >> 16);
+    for (const uint16_t *at = (const uint16_t *)RAMSTART; at < (const uint16_t *)(RAMEND - 1); at += 4) {
+        sum += *at;
+        sums += sum;
+    }
+    boot = (uint32_t)sums << 16 | sum;
 }
 
 int main(void) {
     reset_cause = cause_at_reset;
-    DDRG |= _BV(PG5);
-    DDRH |= _BV(PH3);
-    PORTB |= _BV(PB0);
-    DDRB |= _BV(PB0) | _BV(PB1) | _BV(PB2);
-    prepare_converter();
+    OUTPUT(LED);
+    drive_prepare();
     UCSR0A = _BV(U2X0);
     UBRR0 = F_CPU / 8 / BAUD - 1;
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);

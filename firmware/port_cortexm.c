@@ -55,8 +55,10 @@ __attribute__((section(".vectors"), used)) static void (*const vectors[])(void) 
 uint32_t port_counts(uint8_t channel) { return encoder_counts[channel]; }
 uint16_t port_illegal(void) { return 0; }
 void port_command(int16_t steps) { converter = steps; }
+bool port_settled(void) { return true; }
 void port_enable(bool on) { power = on; }
 uint8_t port_reset_cause(void) { return 0; }
+uint32_t port_boot(void) { return 0; }
 
 void port_send(const uint8_t *bytes, uint16_t n) {
     while (n--) {

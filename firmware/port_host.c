@@ -9,6 +9,8 @@
  *     wrap CHANNEL V  the counter's own number, without that anything moved
  *     illegal         a quadrature transition that no encoder makes
  *     overrun         a tick comes due during the one before
+ *     glitch STEPS    the converter puts out something else than it was commanded
+ *     reset           the board starts anew, as after a dip of its supply
  *     run TICKS       time passes without the host
  *     skip TICKS      the same, but of these ticks only the last one comes
  *     state           answers: tick, psi, psi', theta, theta', command [steps], enable line, mode
@@ -44,16 +46,18 @@ static mishaps_t mishaps;
 static uint32_t counter[CHANNELS];
 static uint16_t illegal;
 static int16_t command;
-static uint32_t tick;
+static uint32_t tick, passed; /* of the board, and since its process began */
 
 uint32_t port_counts(uint8_t channel) { return counter[channel]; }
 uint16_t port_illegal(void) { return illegal; }
 void port_command(int16_t steps) { command = steps; }
+bool port_settled(void) { return true; }
 void port_enable(bool on) {
     enabled = on;
     plant.running |= on;
 }
 uint8_t port_reset_cause(void) { return 0; }
+uint32_t port_boot(void) { return port_virtual ? 0 : (uint32_t)time(NULL) ^ (uint32_t)getpid() << 16; }
 uint32_t port_lock(void) { return 0; } /* tick and frames take turns in one thread */
 void port_unlock(uint32_t before) { (void)before; }
 
@@ -76,6 +80,7 @@ static void pass(uint32_t ticks, uint16_t late) {
         shown[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i));
         counter[i] += (uint32_t)(shown[i] - before); /* on from wherever a wrap has put it */
     }
+    passed += ticks;
     rig_tick(tick += ticks, late);
     rig_poll();
 }
@@ -89,6 +94,11 @@ static void obey(const char *line) {
         counter[a] = (uint32_t)b;
     } else if (!strcmp(line, "illegal")) {
         illegal++;
+    } else if (sscanf(line, "glitch %ld", &a) == 1) {
+        command = (int16_t)a;
+    } else if (!strcmp(line, "reset")) {
+        tick = 0;
+        rig_reset();
     } else if (!strcmp(line, "overrun")) {
         rig_overrun();
     } else if (sscanf(line, "run %ld", &a) == 1 && port_virtual) {
@@ -96,7 +106,7 @@ static void obey(const char *line) {
     } else if (sscanf(line, "skip %ld", &a) == 1 && port_virtual && a > 0) {
         pass((uint32_t)a, 0);
     } else if (!strcmp(line, "state")) {
-        printf("%u %.17g %.17g %.17g %.17g %d %d %d\n", tick, plant.x[0], plant.x[1], plant.x[2], plant.x[3], command,
+        printf("%u %.17g %.17g %.17g %.17g %d %d %d\n", passed, plant.x[0], plant.x[1], plant.x[2], plant.x[3], command,
                enabled, rig_mode());
         fflush(stdout);
         return;
@@ -169,7 +179,7 @@ int main(int count, char **arguments) {
     for (;;) {
         struct timespec wait = {0, 0}, *until_tick = port_virtual ? NULL : &wait;
         if (!port_virtual) {
-            int64_t since = nanoseconds() - start - (int64_t)tick * PERIOD_NS;
+            int64_t since = nanoseconds() - start - (int64_t)passed * PERIOD_NS;
             if (since >= PERIOD_NS) {
                 uint32_t ticks = (uint32_t)(since / PERIOD_NS);
                 int64_t late = since % PERIOD_NS / 1000;

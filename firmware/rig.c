@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "bytes.h"
+#include "ceilings.h"
 #include "frame.h"
 #include "law.h"
 #include "port.h"
@@ -63,6 +64,7 @@ static uint16_t pulse_left;
 static uint8_t until_law;                              /* ticks to the law's next sample */
 static uint16_t lost;                                  /* ticks that never came */
 static bool overran;                                   /* a tick came due during this one */
+static uint16_t session;                               /* what a request has to name; see perform_once */
 static bool awaited, due;                              /* an exchange; the sample that answers it */
 static uint8_t answer_every = 1;                       /* ticks */
 static uint32_t answer_at;                             /* the next tick that may answer */
@@ -72,6 +74,7 @@ static uint8_t awaited_sequence;
 static receiver_t receiver;
 static uint8_t payload[PAYLOAD_MOST + CRC_BYTES], frame[FRAME_MOST];
 static uint8_t last_kind, last_sequence, last_result;
+static uint32_t last_nonce;
 
 static bool running(void) { return mode == HOST || mode == MCU; }
 static bool powered(void) { return mode == ARMED || running(); }
@@ -96,6 +99,7 @@ static void trip(uint16_t fault) {
     enum mode before = mode;
     int16_t was = output;
     power_off(FAULT);
+    session++;
     if (!faults) {
         snapshot.sample = now;
         snapshot.sample.applied = was;
@@ -180,7 +184,7 @@ void rig_tick(uint32_t tick, uint16_t late) {
         silence += elapsed;
         saturated = size_of(output) < (uint32_t)limits.command ? 0 : saturated + elapsed;
         if (running() && elapsed > limits.watchdog) trip(F_OVERRUN);
-        else if (silence > (running() || pulsing() ? limits.watchdog : PATIENCE_ARMED)) trip(F_WATCHDOG);
+        else if (silence > (running() || pulsing() ? limits.watchdog : CEILING_PATIENCE)) trip(F_WATCHDOG);
         else if (limits.saturation != FOREVER && saturated > limits.saturation) trip(F_SATURATION);
     }
     if (mode == MCU) follow_law();
@@ -192,6 +196,8 @@ void rig_tick(uint32_t tick, uint16_t late) {
         overran = false;
         if (running()) trip(F_OVERRUN);
     }
+    if (!running() && !pulsing()) port_command(0); /* to a converter that lost its number, too */
+    if (!powered()) port_enable(false);
     now.mode = mode;
     now.faults = faults;
     if ((int32_t)(tick - answer_at) < 0) return;
@@ -210,24 +216,33 @@ static uint8_t *put_sample(uint8_t *at, const sample_t *sample) {
 }
 
 /* Every reply begins alike; `end` is where its body ends. */
-#define BODY 10
+#define HEADER 4 /* kind, sequence, session */
+static uint16_t session_now(void) {
+    uint32_t before = port_lock();
+    uint16_t copy = session;
+    port_unlock(before);
+    return copy;
+}
+
+#define BODY (HEADER + 8)
 static void reply(uint8_t kind, uint8_t sequence, uint8_t result, const sample_t *at, const uint8_t *end) {
     payload[0] = kind | REPLY;
     payload[1] = sequence;
-    payload[2] = result;
-    payload[3] = at->mode;
-    put_u16(payload + 4, at->faults);
-    put_u32(payload + 6, at->tick);
+    put_u16(payload + 2, session_now());
+    payload[HEADER] = result;
+    payload[HEADER + 1] = at->mode;
+    put_u16(payload + HEADER + 2, at->faults);
+    put_u32(payload + HEADER + 4, at->tick);
     port_send(frame, frame_make(payload, (uint16_t)(end - payload), frame));
 }
 
-/* The newest sample as things stand now; the host that asks is alive. */
-static sample_t latest(void) {
+/* The newest sample as things stand now; a host that asks in this session is alive. */
+static sample_t latest(bool alive) {
     uint32_t before = port_lock();
     sample_t copy = now;
     copy.mode = mode;
     copy.faults = faults;
-    if (mode == ARMED) silence = 0;
+    if (mode == ARMED && alive) silence = 0;
     port_unlock(before);
     return copy;
 }
@@ -245,6 +260,19 @@ void rig_poll(void) {
 bool rig_waiting(void) { return awaited; }
 enum mode rig_mode(void) { return mode; }
 
+/* Never wider than the board was compiled for. */
+static void hold_to_ceilings(limits_t *offered) {
+    static const uint32_t travel[CHANNELS] = {CEILING_TRAVEL_1, CEILING_TRAVEL_2};
+    static const uint32_t speed[CHANNELS] = {CEILING_SPEED_1, CEILING_SPEED_2};
+    int16_t command = (int16_t)((int32_t)port_steps * CEILING_COMMAND / 100 - (CEILING_COMMAND == 100));
+    for (uint8_t i = 0; i < CHANNELS; i++) {
+        if (offered->travel[i] > travel[i]) offered->travel[i] = travel[i];
+        if (offered->speed[i] > speed[i]) offered->speed[i] = speed[i];
+    }
+    if (offered->saturation > CEILING_SATURATION) offered->saturation = CEILING_SATURATION;
+    if (offered->command > command) offered->command = command;
+}
+
 static uint8_t configure(const uint8_t *b) {
     limits_t offered;
     uint32_t *numbers[] = {offered.travel, offered.speed, offered.start, offered.frozen};
@@ -257,8 +285,9 @@ static uint8_t configure(const uint8_t *b) {
     offered.saturation = get_u32(b + 4);
     offered.watchdog = get_u16(b + 8);
     offered.command = (int16_t)get_u16(b + 10);
-    if (!offered.watchdog || offered.watchdog > LONGEST_WATCHDOG || !offered.saturation) return WRONG_VALUE;
+    if (!offered.watchdog || offered.watchdog > CEILING_WATCHDOG || !offered.saturation) return WRONG_VALUE;
     if (offered.command <= 0 || offered.command > (int32_t)port_steps || offered.twist > NO_LIMIT) return WRONG_VALUE;
+    hold_to_ceilings(&offered);
     uint32_t before = port_lock();
     limits = offered;
     configured = true;
@@ -279,6 +308,8 @@ static uint8_t *put_limits(uint8_t *b) {
 
 static uint8_t arm(void) {
     if (!configured) return NOT_CONFIGURED;
+    port_command(0);
+    while (!port_settled()) {} /* the power stage is on after that */
     uint32_t before = port_lock();
     bool off = false;
     for (uint8_t i = 0; i < CHANNELS; i++) off |= beyond(size_of(now.q[i]), limits.start[i]);
@@ -289,7 +320,6 @@ static uint8_t arm(void) {
         asked = output = 0;
         reference = 0;
         memset(travelled_alone, 0, sizeof travelled_alone);
-        port_command(0);
         port_enable(true);
         mode = ARMED;
     }
@@ -337,17 +367,20 @@ static uint8_t take_law(const uint8_t *b) {
     return WRONG_VALUE;
 }
 
-/* A command for a sample that is older than the watchdog's time has waited in a buffer on its way: stopping is safer
- * than to follow it. */
-static void exchange(uint8_t sequence, const uint8_t *b) {
-    float offered = get_float(b + 2);
-    uint16_t answered = get_u16(b + 6);
+/* A command for a sample that is older than the watchdog's time, or of another session, has waited in a buffer on its
+ * way: stopping is safer than to follow it. */
+static void exchange(uint8_t sequence, bool current, const uint8_t *b) {
+    float offered = get_float(b);
+    uint32_t answered = get_u32(b + 4);
     uint32_t before = port_lock();
-    if (running() && (uint16_t)((uint16_t)now.tick - answered) > limits.watchdog) trip(F_STALE);
+    if (running() && (!current || now.tick - answered > limits.watchdog)) trip(F_STALE);
     if (running() && !sane(offered)) trip(F_GAINS);
-    if (mode == HOST) put_out((int16_t)get_u16(b));
-    reference = offered;
-    silence = 0;
+    if (mode == HOST) {
+        int32_t steps = (int32_t)offered;
+        put_out(steps > INT16_MAX ? INT16_MAX : steps < -INT16_MAX ? -INT16_MAX : (int16_t)steps);
+    }
+    if (mode == MCU) reference = offered;
+    if (current) silence = 0;
     awaited = true;
     awaited_sequence = sequence;
     port_unlock(before);
@@ -366,10 +399,24 @@ static bool allowed(uint8_t kind) {
     }
 }
 
+#define GREETING_BYTES 5
 static const uint8_t length_of[] = {
-    [HELLO] = 1, [CONFIGURE] = LIMITS_BYTES, [ZERO] = 0, [SELF_TEST] = 4, [ARM] = 0, [START] = 1, [EXCHANGE] = 8,
+    [HELLO] = GREETING_BYTES, [CONFIGURE] = LIMITS_BYTES, [ZERO] = 0, [SELF_TEST] = 4, [ARM] = 0, [START] = 1, [EXCHANGE] = 8,
     [STOP] = 0, [ESTOP] = 0, [CLEAR] = 0, [LAW] = LAW_BYTES, [SNAPSHOT] = 0,
 };
+
+/* A number for a new host that no frame of an earlier one names, whatever it says for its own. */
+static uint16_t fresh(uint32_t nonce) {
+    uint8_t mixed[12];
+    put_u32(mixed, nonce);
+    put_u32(mixed + 4, session ^ port_boot());
+    put_u32(mixed + 8, now.tick);
+    uint32_t number = crc32_of(mixed, sizeof mixed);
+    return (uint16_t)(number ^ number >> 16);
+}
+
+/* Whoever stops the rig, or looks at it, needs no number. */
+static bool of_any_session(uint8_t kind) { return kind == HELLO || kind == STOP || kind == ESTOP || kind == SNAPSHOT; }
 
 static uint8_t perform(uint8_t kind, const uint8_t *b) {
     switch (kind) {
@@ -388,6 +435,7 @@ static uint8_t perform(uint8_t kind, const uint8_t *b) {
         power_off(FAULT);
         faults = (faults & ~F_STOP) | F_RESET;
         configured = has_law = false;
+        session = fresh(get_u32(b + 1));
         answer_every = b[0] ? b[0] : 1;
         answer_at = now.tick - now.tick % answer_every + answer_every;
         break;
@@ -419,8 +467,9 @@ static uint8_t *put_answer(uint8_t kind, uint8_t *b) {
         b[4] = port_reset_cause();
         put_u16(b + 5, port_period);
         put_u16(b + 7, port_steps);
-        memcpy(b + 9, port_name, n);
-        return b + 9 + n;
+        put_u32(b + 9, last_nonce); /* that this answers what was asked now */
+        memcpy(b + 13, port_name, n);
+        return b + 13 + n;
     }
     case CONFIGURE: return put_limits(b);
     case LAW: law_give(&law, b); return b + LAW_BYTES;
@@ -442,36 +491,56 @@ static uint8_t *put_answer(uint8_t kind, uint8_t *b) {
     return b;
 }
 
+/* What is done counts the session on, and so does a fault: what was asked once, and lies in a buffer or is sent again
+ * by somebody, is of another session and not done again. */
+static uint8_t perform_once(uint8_t kind, const uint8_t *b) {
+    uint8_t result = perform(kind, b);
+    uint32_t before = port_lock();
+    if (result == DONE && kind != SNAPSHOT && kind != HELLO) session++;
+    port_unlock(before);
+    return result;
+}
+
 /* Not inlined: a byte from the wire must not save all the registers that a whole frame needs. */
 __attribute__((noinline)) static void answer(const uint8_t *request, uint16_t n) {
     uint8_t kind = request[0], sequence = request[1], result;
+    bool current = get_u16(request + 2) == session_now();
     /* A host that missed the reply asks again by the same number: it is told once more, but nothing is done twice. */
-    if (kind == last_kind && sequence == last_sequence && kind != HELLO && kind != EXCHANGE) {
+    bool again = kind == last_kind && sequence == last_sequence && kind != EXCHANGE;
+    if (kind == HELLO && n == HEADER + GREETING_BYTES) {
+        again &= get_u32(request + HEADER + 1) == last_nonce;
+        last_nonce = get_u32(request + HEADER + 1);
+    }
+    if (again) {
         result = last_result;
     } else if (kind == 0 || kind >= sizeof length_of) {
         result = UNKNOWN;
-    } else if (n - 2 != length_of[kind]) {
+    } else if (n - HEADER != length_of[kind]) {
         result = WRONG_LENGTH;
     } else if (!allowed(kind)) {
         result = mode == FAULT ? FAULTED : WRONG_MODE;
     } else if (kind == EXCHANGE) {
-        exchange(sequence, request + 2);
+        exchange(sequence, current, request + HEADER);
         last_kind = kind;
         return; /* answered by the tick that follows it */
+    } else if (!current && !of_any_session(kind)) {
+        sample_t at = latest(false);
+        reply(kind, sequence, WRONG_SESSION, &at, payload + BODY);
+        return; /* nor does it take the place of what was asked last */
     } else {
-        result = perform(kind, request + 2);
+        result = perform_once(kind, request + HEADER);
     }
     last_kind = kind;
     last_sequence = sequence;
     last_result = result;
-    sample_t at = latest();
+    sample_t at = latest(current);
     bool told = result == DONE || kind == CONFIGURE || kind == LAW;
     reply(kind, sequence, result, &at, told ? put_answer(kind, payload + BODY) : payload + BODY);
 }
 
 void rig_receive(uint8_t byte) {
     uint16_t n = frame_receive(&receiver, byte);
-    if (n >= 2) answer(receiver.bytes, n);
+    if (n >= HEADER) answer(receiver.bytes, n);
 }
 
 void rig_reset(void) {

@@ -3,7 +3,7 @@
  *     IDLE -> ARMED -> HOST | MCU -> IDLE        any of them -> FAULT -> (CLEAR) -> IDLE
  *
  * In IDLE and FAULT the command is zero and the power stage is off. A reset and a new host's HELLO end in FAULT:
- * nothing moves before the host has cleared it and said limits. The numbers of modes and faults are those of src/upright/rigs/protocol.py, frames those of
+ * nothing moves before the host has cleared it and said limits, none of them wider than ceilings.h. The numbers of modes and faults are those of src/upright/rigs/protocol.py, frames those of
  * src/upright/rigs/wire.py; docs/firmware.md has both as tables.
  *
  * This is supervision in software, not a rated safety function; a rig needs a stop in hardware besides. */
@@ -12,7 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define PROTOCOL 1
+#define PROTOCOL 2
 
 enum mode { IDLE, ARMED, HOST, MCU, FAULT };
 
@@ -48,12 +48,10 @@ enum request {
     REPLY = 0x80,
 };
 
-enum result { DONE, WRONG_LENGTH, WRONG_MODE, WRONG_VALUE, NOT_CONFIGURED, FAULTED, OFF_START, UNKNOWN };
+enum result { DONE, WRONG_LENGTH, WRONG_MODE, WRONG_VALUE, NOT_CONFIGURED, FAULTED, OFF_START, UNKNOWN, WRONG_SESSION };
 
-#define SPEED_WINDOW 8        /* ticks over which a speed is measured; a power of two */
-#define PATIENCE_ARMED 10000  /* ticks that an armed rig at zero command waits for its host */
-#define LONGEST_WATCHDOG 5000 /* ticks */
-#define LONGEST_PULSE 300000  /* of a self-test [us] */
+#define SPEED_WINDOW 8       /* ticks over which a speed is measured; a power of two */
+#define LONGEST_PULSE 300000 /* of a self-test [us] */
 
 void rig_reset(void);
 void rig_receive(uint8_t byte); /* from the wire, outside of the tick */

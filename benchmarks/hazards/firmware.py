@@ -20,7 +20,7 @@ from benchmarks.hazards import twin
 from upright.rig import Rig
 from upright.rigs import Fault
 from upright.rigs.line import TerminalLine
-from upright.rigs.wire import Kind, pack, unpack
+from upright.rigs.wire import Kind, Parser, pack
 
 PERIOD = 1e-3
 ANSWERED_WITHIN = 1.0
@@ -63,29 +63,30 @@ class PatientLine:
     def __init__(self, on: FirmwareHazards, path: str) -> None:
         self.name, self.waited = "its port", 0.0
         self.spoils, self.spoiled, self.loses, self.cut = 0.0, 0, 0, False
+        self.sent: list[bytes] = []
         self._on, self._line = on, TerminalLine(path)
         self._rng = np.random.default_rng(5)
-        self._expected = self._greeted = self._unended = False
+        self._expected = self._greeted = False
         self._asked = self._quiet = 0.0
 
     def clock(self) -> float:
         return self.waited
 
     def write(self, data: bytes) -> None:
-        asked = unpack(data[:-1])
-        self._greeted = asked is not None and asked.kind == Kind.HELLO
+        self.sent.append(data)
+        (asked,) = Parser().feed(data)
+        self._greeted = asked.kind == Kind.HELLO
         self._expected, self._asked, self._quiet = False, self._on.look(), 0.0
         if self.loses:
             self.loses -= 1
         elif not self.cut:
             sent = self._over(data)
-            self._expected = sent == data and not self._unended
-            self._unended = not sent.endswith(b"\0")
+            self._expected = sent == data
             self._line.write(sent)
 
     def read(self, patience: float) -> bytes:
         data = b""
-        while self._expected and not data.endswith(b"\0"):
+        while self._expected and data.count(0) < 2:  # one in front of a frame, and one behind it
             more = self._line.read(ANSWERED_WITHIN)
             data += more
             self._expected = bool(more)
@@ -114,9 +115,8 @@ class PatientLine:
 
 def _by_the_clock(greeting: bytes) -> bytes:
     """The greeting of a board that does not say that its time is virtual."""
-    said = unpack(greeting[:-1])
-    assert said is not None
-    return pack(said.kind, said.sequence, said.body[:9] + b"\0" + said.body[10:])
+    (said,) = Parser().feed(greeting)
+    return pack(said.kind, said.sequence, said.session, said.body[:9] + b"\0" + said.body[10:])
 
 
 class Encoders:
@@ -216,4 +216,4 @@ def host_port(*, by_the_wall: bool = False) -> FirmwareHazards:
 
 def atmega2560() -> FirmwareHazards:
     """The ATmega2560's own program under simavr, with quadrature edges and SPI frames."""
-    return FirmwareHazards(Path(_folder.name) / "simrig", Path(_folder.name) / "atmega2560.elf")
+    return FirmwareHazards(Path(_folder.name) / "simrig", Path(_folder.name) / "atmega2560-analog.elf")

@@ -1,9 +1,10 @@
-"""Do the quick tests notice when one place of the code is changed? Random changes, room by room.
+"""Do the tests notice when one place of the code is changed? Random changes, room by room.
 
 Operators, comparisons, constants, guards, indices and signs: each change is one place, drawn from all of them, and the
-tests that cover it run until one fails, the nearest and cheapest first, 60 s of them. A test that hangs has noticed.
-Intervals are Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is
-left out of the share when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
+quick tests that cover it run until one fails, the nearest and cheapest first, 60 s of CPU of them. `--slow` then runs
+the slow tests that cover what no quick one noticed, 120 s of them. A test that hangs has noticed. Intervals are
+Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is left out of
+the shares when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
 """
 
 from __future__ import annotations
@@ -12,20 +13,19 @@ import math
 import os
 import random
 import tempfile
-import threading
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from queue import SimpleQueue
 
-from benchmarks.measure import Line, Target
-from benchmarks.mutants.covering import SOURCE, map_of
+from benchmarks.measure import Line, Target, page
+from benchmarks.mutants.covering import SOURCE, digest, map_of
 from benchmarks.mutants.places import Change, compiles, places
-from benchmarks.mutants.trial import Bench, Outcome
+from benchmarks.mutants.trial import SECONDS, SLOW_SECONDS, Bench, Outcome
+from benchmarks.mutants.trying import Kept, said, tried
 
 ROOT = Path(__file__).parents[2]
 UNNOTICED = 0.10
 """Share of changes that may go unnoticed."""
+NOT = ": share not noticed"
 DEEPER = "identification"
 """Room whose own rooms are counted one by one."""
 
@@ -66,11 +66,6 @@ def interval(hits: int, of: int) -> tuple[float, float]:
     return (middle - half) / (1 + z * z / of), (middle + half) / (1 + z * z / of)
 
 
-def said(change: Change, shown: str) -> str:
-    """A change as it is listed, and as a judge writes it down."""
-    return f"{change.path.removeprefix(SOURCE + '/')}:{change.place.line} {shown}"
-
-
 def judged(file: Path | None) -> set[str]:
     """Changes that make no difference, by a file: everything before `  # ` in each line."""
     lines = file.read_text(encoding="utf-8").splitlines() if file else []
@@ -79,70 +74,85 @@ def judged(file: Path | None) -> set[str]:
 
 def run(
     *, quick: bool, progress: Callable[[str], None], sample: int = 150, seed: int = 0, within: str = "",
-    folder: Path | None = None, verdicts: Path | None = None, workers: int = 2,
+    folder: Path | None = None, verdicts: Path | None = None, workers: int = 2, slow: bool = False,
+    markdown: Path | None = None,
 ) -> list[Line]:  # fmt: skip
-    """A line for each room, one for all, and one for each change that went unnoticed."""
+    """A line for each room, one or two for all, and one for each change that went unnoticed."""
     cache = Path(os.environ["UPRIGHT_CACHE"]) if os.environ.get("UPRIGHT_CACHE") else None
     kept = folder or (cache or ROOT / "build") / "mutants"
     harmless = judged(verdicts)
     changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
     covered = map_of(ROOT, kept, workers, progress)
-    done: list[Outcome] = []
-    stop = threading.Event()
+    slower = map_of(ROOT, kept, workers, progress, slow=True) if slow else None
+    by_slow: list[Outcome] | None = None
     with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:
         benches = [Bench(ROOT, Path(name) / str(i), cache) for i in range(workers)]
-        idle: SimpleQueue[Bench] = SimpleQueue()
-        for bench in benches:
-            idle.put(bench)
-
-        def work(change: Change) -> Outcome | None:
-            bench = idle.get()
-            try:
-                outcome = None if stop.is_set() else bench.outcome(change, covered)
-                return None if stop.is_set() else outcome
-            finally:
-                idle.put(bench)
-
-        with ThreadPoolExecutor(workers) as pool:
-            try:
-                for future in as_completed([pool.submit(work, change) for change in changes]):
-                    if (outcome := future.result()) is not None:
-                        done.append(outcome)
-                        what = said(outcome.change, outcome.shown)
-                        heard = f"noticed by {outcome.by}" if outcome.noticed else f"NOT noticed, {outcome.ran} tests"
-                        progress(f"{len(done)} of {len(changes)}: {what}: {heard}")
-            except KeyboardInterrupt:
-                progress("interrupted; what is finished is counted")
-                stop.set()
-                for bench in benches:
-                    bench.end()
-    return table(done, harmless)
+        before = [Kept(kept / f"{suite}-{digest(ROOT)}.jsonl") for suite in ("quick", "slow")]
+        done = tried(benches, changes, covered, SECONDS, before[0], progress)
+        if slower is not None:
+            left = [o.change for o in done if not o.noticed and _line(o) not in harmless]
+            by_slow = tried(benches, left, slower, SLOW_SECONDS, before[1], progress)
+    lines = table(done, harmless, by_slow)
+    if markdown is not None:
+        asked = f"Sample {len(changes)}, seed {seed}{f', within {within}' * bool(within)}; {len(done)} were tried."
+        text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines))
+        markdown.write_text(text, encoding="utf-8")
+    return lines
 
 
-def table(done: Sequence[Outcome], harmless: Iterable[str] = ()) -> list[Line]:
-    """Shares of rooms and of all, then what was not noticed."""
+def _line(outcome: Outcome) -> str:
+    """An outcome as a line of the judged ones begins."""
+    return " ".join(said(outcome.change, outcome.shown).split())
+
+
+def table(
+    done: Sequence[Outcome], harmless: Iterable[str] = (), by_slow: Sequence[Outcome] | None = None
+) -> list[Line]:
+    """Shares of rooms and of all, by quick tests and by all of them, then what no quick test noticed."""
     left_out = set(harmless)
-    counted = [o for o in done if " ".join(said(o.change, o.shown).split()) not in left_out]
-    lines = [_share(name, [o for o in counted if room(o.change.path) == name])
+    counted = [o for o in done if _line(o) not in left_out]
+    lines = [_share(name, [o.noticed for o in counted if room(o.change.path) == name])
              for name in sorted({room(o.change.path) for o in counted})]  # fmt: skip
     judged_out = len(done) - len(counted)
-    lines.append(
-        _share("all", counted, asked=True, note=f"; {judged_out} judged to make no difference" * bool(judged_out))
-    )
+    note = f"; {judged_out} judged to make no difference" * bool(judged_out)
+    lines.append(_share("all", [o.noticed for o in counted], asked=True, note=note))
+    slowly = {o.change: o for o in by_slow or ()}
+    if by_slow is not None:
+        known = [o for o in counted if o.noticed or o.change in slowly]
+        both = [o.noticed or slowly[o.change].noticed for o in known]
+        lines.append(_share("all, by quick and slow tests", both, asked=True, note=note))
     missed = sorted((o for o in counted if not o.noticed), key=lambda o: (o.change.path, o.change.place.line))
     return lines + [
         Line(contender=f"{o.change.path.removeprefix(SOURCE + '/')}:{o.change.place.line}",
-             note=f"{o.shown} ({o.ran} tests ran, {o.covering} cover it)")
+             note=f"{o.shown} ({_tests(o, slowly.get(o.change))})")
         for o in missed
     ]  # fmt: skip
 
 
-def _share(name: str, outcomes: Sequence[Outcome], *, asked: bool = False, note: str = "") -> Line:
-    noticed, of = sum(o.noticed for o in outcomes), len(outcomes)
-    low, high = interval(noticed, of)
-    missed = 1 - noticed / of if of else 0.0
+def _tests(quick: Outcome, slow: Outcome | None) -> str:
+    if slow is not None and slow.noticed:
+        return f"slow: {slow.by}"
+    also = "" if slow is None else f"; slow: {slow.ran} ran, {slow.covering} cover it"
+    return f"{quick.ran} tests ran, {quick.covering} cover it{also}"
+
+
+def _share(name: str, noticed: Sequence[bool], *, asked: bool = False, note: str = "") -> Line:
+    hits, of = sum(noticed), len(noticed)
+    low, high = interval(hits, of)
+    missed = 1 - hits / of if of else 0.0
     return Line(
-        contender=f"{name}: share not noticed", ratio=(missed, 1 - high, 1 - low) if of else None,
+        contender=f"{name}{NOT}", ratio=(missed, 1 - high, 1 - low) if of else None,
         target=Target(most=UNNOTICED) if asked else None,
-        note=f"{noticed} of {of} noticed, {100 * (1 - missed):.0f} % ({100 * low:.0f} to {100 * high:.0f}){note}",
+        note=f"{hits} of {of} noticed, {100 * (1 - missed):.0f} % ({100 * low:.0f} to {100 * high:.0f}){note}",
     )  # fmt: skip
+
+
+def _body(asked: str, lines: Sequence[Line]) -> list[str]:
+    """Shares as a table, then the changes that no quick test noticed."""
+    shares = [line for line in lines if line.contender.endswith(NOT)]
+    listed = [line for line in lines if not line.contender.endswith(NOT)]
+    return [
+        asked, "", "| room | noticed |", "|---|---|",
+        *(f"| {line.contender.removesuffix(NOT)} | {line.note} |" for line in shares),
+        "", "Not noticed by a quick test:", "", *(f"- `{line.contender}` `{line.note}`" for line in listed),
+    ]  # fmt: skip

@@ -1,7 +1,8 @@
-"""Which tests run which lines of the package, and how long they take: the quick suite once under `coverage`.
+"""Which tests run which lines of the package, and how long they take: quick or slow tests once under `coverage`.
 
 The map is kept in a folder by the text of the tree. For another tree the map that is most like it is brought up to
-date: test files that changed run again, and lines of the source move with their text. Lines that run when a module is
+date: test files that changed run again, a few files at a time, and lines of the source move with their text, so that
+a map that was interrupted goes on where it stopped. Lines that run when a module is
 imported belong to no test; neither does the text of kernels, which is compiled. For them the tests of the whole
 function stand in, else those of the module, else those of its room.
 """
@@ -30,6 +31,8 @@ MAPS = 8
 """Maps kept of other trees."""
 START = 0.02
 """Seconds that the shortest test costs all the same."""
+BATCH = 8
+"""Files of slow tests that run before the map is kept."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,45 +91,54 @@ def _around(text: str, line: int) -> list[range]:
     return [range(span.start + 1, span.stop) for span in sorted(found, key=len)]
 
 
-def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], None]) -> Covering:
-    """The map of a tree, made or brought up to date where there is none."""
+def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], None], *, slow: bool = False) -> Covering:
+    """The map of a tree by its quick tests or by its slow ones, made or brought up to date where there is none."""
     files = {p: _digest(root / p) for p in _listed(root, "tests", "benchmarks")}
     sources = {p: (root / p).read_text(encoding="utf-8") for p in _listed(root, SOURCE)}
-    key = hashlib.sha256(json.dumps([files, sources], sort_keys=True).encode()).hexdigest()[:16]
-    kept = folder / f"covering-{key}.json"
-    if kept.exists():
-        return _read(kept)
+    name = "slow" if slow else "covering"
+    kept = folder / f"{name}-{digest(root)}.json"
     folder.mkdir(parents=True, exist_ok=True)
-    maps = sorted(folder.glob("covering-*.json"), key=lambda path: path.stat().st_mtime)
+    maps = sorted(folder.glob(f"{name}-*.json"), key=lambda path: path.stat().st_mtime)
     for path in maps[:-MAPS]:
         path.unlink(missing_ok=True)
     tests = [p for p in files if Path(p).name.startswith("test_")]
-    if maps:
-        old = max((_read(path) for path in maps[-MAPS:]), key=lambda m: sum(m.files.get(p) == files[p] for p in tests))
-        changed = [p for p in tests if old.files.get(p) != files[p]]
-        progress(f"a map of {folder} brought up to date: {len(changed)} of {len(tests)} files of tests run again")
-    else:
-        old, changed = None, tests
-        progress(f"quick tests under coverage, once; kept in {folder}")
-    new = Covering(seconds={}, tests=[], files={}, sources={}, lines={})
-    if changed:
-        with tempfile.TemporaryDirectory(prefix="upright-covering-") as name:
-            run_tests(root, Path(name), changed if old else [], workers)
-            new = gather(root, Path(name))
-    whole = joined(moved(old, sources, set(files) - set(changed)), new) if old else new
-    whole = Covering(seconds=whole.seconds, tests=whole.tests, files=files, sources=sources, lines=whole.lines)
-    _write(kept, whole)
+    nothing = Covering(seconds={}, tests=[], files={}, sources={}, lines={})
+    read = [_read(path) for path in ([kept] if kept.exists() else maps[-MAPS:])]
+    old = max(read, key=lambda m: sum(m.files.get(p) == files[p] for p in tests), default=nothing)
+    changed = [p for p in tests if old.files.get(p) != files[p]]
+    if kept.exists() and not changed:
+        return read[0]
+    progress(f"{name} map in {folder}: {len(changed)} of {len(tests)} files of tests run under coverage")
+    whole = moved(old, sources, set(files) - set(changed))
+    ran = {p: digest for p, digest in files.items() if p not in changed}
+    size = BATCH if slow else max(len(changed), 1)
+    for batch in [changed[i : i + size] for i in range(0, len(changed), size)] or [[]]:
+        if batch:
+            with tempfile.TemporaryDirectory(prefix="upright-covering-") as place:
+                run_tests(root, Path(place), batch if len(batch) < len(tests) else [], workers, slow=slow)
+                whole = joined(whole, gather(root, Path(place)))
+        ran |= {p: files[p] for p in batch}
+        whole = Covering(seconds=whole.seconds, tests=whole.tests, files=dict(ran), sources=sources, lines=whole.lines)
+        _write(kept, whole)
     return whole
 
 
-def run_tests(root: Path, folder: Path, tests: Iterable[str], workers: int) -> None:
-    """Run quick tests with their lines and outcomes written to a folder."""
+def digest(root: Path) -> str:
+    """The text of a tree's sources and tests, in a few letters."""
+    texts = [(path, _digest(root / path)) for path in _listed(root, "tests", "benchmarks", SOURCE)]
+    return hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:16]
+
+
+def run_tests(root: Path, folder: Path, tests: Iterable[str], workers: int, *, slow: bool = False) -> None:
+    """Run quick or slow tests with their lines and outcomes written to a folder."""
     environment = dict(os.environ) | {watch.REPORT: str(folder / "report.jsonl"), watch.LINES: str(folder / "lines")}
     (folder / "lines").mkdir()
+    (folder / "report.jsonl").touch()
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "benchmarks.mutants.watch"]
     with open(folder / "log", "w", encoding="utf-8") as log:
         subprocess.run(
-            [*command, "-n", str(workers), *tests], cwd=root, check=False, stdout=log, stderr=subprocess.STDOUT,
+            [*command, "-n", str(workers), "-m", "slow" if slow else "not slow", *tests],
+            cwd=root, check=False, stdout=log, stderr=subprocess.STDOUT,
             env=environment | {"PYTHONPATH": str(root / "src")},
         )  # fmt: skip
 

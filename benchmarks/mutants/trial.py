@@ -17,8 +17,8 @@ from benchmarks.mutants import watch
 from benchmarks.mutants.covering import Covering
 from benchmarks.mutants.places import Change
 
-SECONDS, SLOWER = 60.0, 2.0
-"""Seconds of CPU of the tests for one change, and how much longer they may take in all."""
+SECONDS, SLOW_SECONDS, SLOWER = 60.0, 120.0, 2.0
+"""Seconds of CPU of the quick tests for one change, of the slow ones, and how much longer they may take in all."""
 PATIENCE = 1800.0
 """Seconds by the clock on the wall after which a run that no longer says anything hangs."""
 MOST = 400
@@ -41,13 +41,13 @@ class Outcome:
     covering: int
 
 
-def chosen(covering: Covering, change: Change, source: bytes) -> tuple[list[str], int]:
+def chosen(covering: Covering, change: Change, source: bytes, seconds: float = SECONDS) -> tuple[list[str], int]:
     """Tests to run for a change, in order, within their seconds; and how many cover the place."""
     text = source.decode()
     last = change.place.line + source.count(b"\n", change.place.start, change.place.end)
     direct = covering.of(change.path, change.place.line, last, text)
     more = covering.of(KERNEL, 1, 10_000, "") if Path(change.path).parent == Path(KERNEL).parent else []
-    budget, tests = SECONDS, []
+    budget, tests = seconds, []
     for test in dict.fromkeys([*direct, *covering.beside(change.path, direct), *more]):
         if len(tests) < MOST and (covering.seconds[test] <= budget or not tests):
             budget -= covering.seconds[test]
@@ -86,14 +86,14 @@ class Bench:
         if self.process is not None:
             _kill(self.process)
 
-    def outcome(self, change: Change, covering: Covering) -> Outcome:
+    def outcome(self, change: Change, covering: Covering, seconds: float = SECONDS) -> Outcome:
         """Run the tests of a change; one that fails without it as well does not count."""
         file = self.tree / change.path
         source = file.read_bytes()
-        tests, direct = chosen(covering, change, source)
+        tests, direct = chosen(covering, change, source, seconds)
         ran, noticed, by = 0, False, ""
         while tests and not noticed:
-            by = self._with(file, change.applied(source), source, tests, covering)
+            by = self._with(file, change.applied(source), source, tests, covering, seconds)
             begun = self._begun()
             ran += len(begun)
             if not by:
@@ -105,11 +105,13 @@ class Bench:
             change=change, shown=shown, noticed=noticed, by=by if noticed else "", ran=ran, covering=direct
         )  # fmt: skip
 
-    def _with(self, file: Path, changed: bytes, source: bytes, tests: Sequence[str], covering: Covering) -> str:
+    def _with(
+        self, file: Path, changed: bytes, source: bytes, tests: Sequence[str], covering: Covering, seconds: float
+    ) -> str:
         """What noticed a changed file: a test, an import that fails, a hang; "" for nothing."""
         try:
             self._write(file, changed)
-            return self._run(tests, covering)
+            return self._run(tests, covering, seconds)
         finally:
             self._write(file, source)
 
@@ -123,21 +125,21 @@ class Bench:
         """Whether a test passes alone and without a change; asked once."""
         if test not in self.alone:
             kept = self.report.read_bytes()
-            self.alone[test] = not self._run([test], covering)
+            self.alone[test] = not self._run([test], covering, SLOW_SECONDS)
             self.report.write_bytes(kept)
         return self.alone[test]
 
-    def _run(self, tests: Sequence[str], covering: Covering) -> str:
+    def _run(self, tests: Sequence[str], covering: Covering, seconds: float) -> str:
         if self.ended:
             return ""
         self.report.write_bytes(b"")
         self.wanted.write_text(json.dumps({test: covering.seconds[test] for test in tests}), encoding="utf-8")
         environment = dict(os.environ) | {
             "PYTHONPATH": str(self.tree / "src"), "UPRIGHT_CACHE": str(self.cache), watch.REPORT: str(self.report),
-            watch.WANTED: str(self.wanted), watch.SECONDS: str(SLOWER * SECONDS), "MPLBACKEND": "Agg",
+            watch.WANTED: str(self.wanted), watch.SECONDS: str(SLOWER * seconds), "MPLBACKEND": "Agg",
         }  # fmt: skip
         files = dict.fromkeys(test.partition("::")[0] for test in tests)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider",
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-m", "", "-p", "no:cacheprovider",
                    "-p", "no:faulthandler", "-p", "benchmarks.mutants.watch", *files]  # fmt: skip
         process = self.process = subprocess.Popen(
             command, cwd=self.tree, env=environment, start_new_session=True, stdin=subprocess.DEVNULL,

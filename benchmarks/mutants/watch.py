@@ -22,6 +22,8 @@ MEMORY = 8 * 2**30
 """Bytes that a changed program may ask for: a loop without an end fills the memory before its time is over."""
 HANG, SLOWER = 30.0, 20.0
 """A test hangs after so many seconds of CPU and so many times its usual time: its code may have to be compiled."""
+LONG, AGAIN = 90.0, 3.0
+"""The same for a test of many seconds, where compiling is the smaller part."""
 STANDS = 5.0
 """How many times as long by the clock on the wall: it may stand still, and others use the machine."""
 
@@ -106,7 +108,8 @@ class Wanted:
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, Any, Any]:
         if time.process_time() > self.until:
             item.session.shouldstop = "time is over"
-        limit = HANG + SLOWER * self.usual[item.nodeid]
+        usual = self.usual[item.nodeid]
+        limit = HANG + min(SLOWER * usual, LONG + AGAIN * usual)
         faulthandler.dump_traceback_later(STANDS * limit, exit=True)
         _end_after(limit)
         try:

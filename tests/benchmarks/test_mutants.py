@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.mutants import drawn, interval, judged, room, said, table
+from benchmarks.mutants import drawn, interval, judged, room, table
 from benchmarks.mutants.covering import Covering, joined, moved
 from benchmarks.mutants.places import Change, compiles, places
 from benchmarks.mutants.trial import Bench, Outcome
+from benchmarks.mutants.trying import Kept, said, tried
 
 ROOT = Path(__file__).parents[2]
 
@@ -130,6 +131,22 @@ def covering_of(root, **tests):
 
 
 @pytest.mark.slow
+def test_what_came_of_a_change_is_kept_and_not_tried_again(tree, tmp_path):
+    bench = Bench(tree, tmp_path / "bench", None)
+    file = tmp_path / "kept.jsonl"
+    changes = [Change(path="src/pkg.py", place=p, text=b"*") for p in places(HALF.encode()) if b"*" in p.instead]
+    covering = covering_of(tree, test_half=2)
+    first = tried([bench], changes[:1], covering, 60.0, Kept(file), lambda _: None)
+    heard = []
+    again = tried([bench], changes, covering, 60.0, Kept(file), heard.append)
+    assert [o.noticed for o in again] == [True, False]
+    assert again[:1] == first
+    assert len(heard) == 1  # of the second change alone
+    assert tried([bench], changes[:1], covering, 60.0, Kept(file), heard.append) == first
+    assert len(heard) == 1
+
+
+@pytest.mark.slow
 def test_a_change_is_noticed_by_a_test_that_passes_without_it(tree, tmp_path):
     """The test of the function that changed; not one that only runs it, and not one that fails in any case."""
     bench = Bench(tree, tmp_path / "bench", None)
@@ -178,6 +195,27 @@ def test_lines_keep_their_tests_when_they_move():
     assert moved(both, {"src/upright/p.py": text}, {"tests/test_a.py"}).seconds == again.seconds
     # a line that no test runs: those of the whole module stand in
     assert set(both.of("src/upright/p.py", 1, 1, text)) == {"tests/test_a.py::z", "tests/test_b.py::y"}
+
+
+def test_quick_tests_alone_and_all_tests_have_a_share_each():
+    """Of four changes one is noticed by a quick test and two by slow ones: 25 and 75 %."""
+    changes = drawn(ROOT, 4, seed=1, within="gains")
+    quick, slow = (
+        [
+            Outcome(change=c, shown=f"a < {i}", noticed=i in noticed, by=f"test_{i}", ran=3, covering=5)
+            for i, c in enumerate(changes)
+        ]
+        for noticed in ((0,), (1, 2))
+    )
+    both = {line.contender: line for line in table(quick, by_slow=slow[1:])}
+    assert both["all: share not noticed"].ratio[0] == 0.75
+    assert both["all, by quick and slow tests: share not noticed"].ratio[0] == 0.25
+    assert sum("slow: test_" in line.note for line in both.values()) == 2
+    assert sum("slow: 3 ran, 5 cover it" in line.note for line in both.values()) == 1
+    assert not [line.contender for line in table(quick) if line.contender.startswith("all, by")]
+    # one that the slow tests have not come to yet counts for neither
+    some = {line.contender: line for line in table(quick, by_slow=slow[1:3])}
+    assert some["all, by quick and slow tests: share not noticed"].ratio[0] == 0.0
 
 
 def test_a_change_judged_to_make_no_difference_is_left_out_of_the_share(tmp_path):

@@ -145,7 +145,7 @@ def test_a_law_is_compared_bit_by_bit_with_what_the_board_holds(host):
                 body = f.body
                 if f.answers(Kind.LAW):
                     body = body[:50] + bytes([body[50] ^ 1]) + body[51:]
-                out += pack(f.kind, f.sequence, body)
+                out += pack(f.kind, f.sequence, f.session, body)
             return out
 
         def close(self):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -197,8 +199,10 @@ def test_a_request_whose_answer_was_lost_is_told_again_and_not_done_again(host):
     rig.clear_fault()
     rig.configure(WIDE)
 
+    session = rig.session
+
     def ask(kind, sequence):
-        line.write(pack(kind, sequence))
+        line.write(pack(kind, sequence, session))
         (reply,) = Parser().feed(line.read(1.0))
         read = status(reply.body)
         assert read is not None
@@ -206,9 +210,170 @@ def test_a_request_whose_answer_was_lost_is_told_again_and_not_done_again(host):
 
     assert ask(Kind.ARM, 77) == Result.DONE
     assert ask(Kind.ARM, 77) == Result.DONE
+    session += 1
     assert ask(Kind.ARM, 78) == Result.WRONG_MODE
     assert ask(Kind.ARM, 78) == Result.WRONG_MODE
     assert rig.exchange(0.0).mode == Mode.ARMED
+
+
+class Recorded:
+    """A line that keeps what was sent."""
+
+    def __init__(self, port):
+        self.name, self._line, self.sent = port, TerminalLine(port), []
+
+    def write(self, data):
+        self.sent.append(data)
+        self._line.write(data)
+
+    def read(self, patience):
+        return self._line.read(patience)
+
+    def close(self):
+        self._line.close()
+
+
+@pytest.mark.parametrize("since", ["stopped", "stopped by hand and cleared", "stopped itself and was cleared", "reset"])
+@pytest.mark.parametrize("mode", [Mode.HOST, Mode.MCU])
+def test_what_was_recorded_of_a_run_and_is_sent_again_switches_nothing_on(host, mode, since):
+    board = host()
+    line = Recorded(board.port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    rig.arm()
+    rig.start(mode, PULL)
+    for _ in range(3):
+        rig.exchange(1.0)
+    recorded = list(line.sent)
+    rig.stop()
+    if since == "stopped by hand and cleared":
+        rig.estop()
+        rig.clear_fault()
+    elif since == "stopped itself and was cleared":
+        rig.arm()
+        rig.start(Mode.HOST)
+        board.do("run 21")
+        rig.clear_fault()
+    elif since == "reset":
+        board.do("reset", "run 50")
+    for frame in [*recorded[1:], *recorded]:  # with a greeting and without
+        line.write(frame)
+        line.read(0.05)
+        board.do("run 1")
+        assert dead(board)
+
+
+def test_an_exchange_of_65536_ticks_ago_is_not_followed(host):
+    """Their last 16 bits are those of now."""
+    line = TerminalLine(host().port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(replace(WIDE, saturation=math.inf))
+    rig.arm()
+    rig.start(Mode.HOST)
+    old = rig.exchange(0.0).tick
+    for _ in range(65_536 - 1):
+        rig.exchange(0.0)
+    line.write(pack(Kind.EXCHANGE, 200, rig.session, exchange(1000.0, old)))
+    tick = rig.exchange(0.0)
+    assert tick.faults == Fault.STALE
+    assert tick.applied == 0.0
+
+
+def test_an_exchange_of_another_session_stops_a_run_and_feeds_no_watchdog(host):
+    board = host()
+    line = TerminalLine(board.port)
+    rig = rig_on(line)
+    rig.open()
+    rig.clear_fault()
+    rig.configure(WIDE)
+    rig.arm()
+    board.do("run 9999")
+    line.write(pack(Kind.EXCHANGE, 200, rig.session - 1, exchange(0.0, 9999)))
+    line.read(0.05)
+    board.do("run 1")
+    assert dead(board)
+    assert rig.exchange(0.0).faults == Fault.WATCHDOG
+    rig.clear_fault()
+    rig.arm()
+    rig.start(Mode.HOST)
+    now = rig.exchange(0.0).tick
+    line.write(pack(Kind.EXCHANGE, 200, rig.session - 1, exchange(1000.0, now)))
+    assert rig.exchange(0.0).faults == Fault.STALE
+    assert dead(board)
+
+
+def test_a_fault_that_came_meanwhile_is_cleared_when_it_is_asked_for(host):
+    board, rig = running(host)
+    rig.exchange(0.0)
+    board.do("run 30")
+    rig.clear_fault()
+    assert rig.exchange(0.0).faults == Fault(0)
+
+
+CEILINGS = {
+    name: int(value, 0)
+    for name, value in re.findall(
+        r"#define CEILING_(\w+) (\w+)",
+        (Path(__file__).parents[2] / "firmware" / "ceilings.h").read_text(encoding="utf-8"),
+    )
+}
+
+
+def test_no_host_goes_beyond_what_the_board_was_compiled_for(host):
+    rig = host().rig()
+    rig.open()
+    rig.clear_fault()
+    free = Limits(travel=(math.inf,) * 2, speed=(math.inf,) * 2, start=(math.inf,) * 2, command=10.0, watchdog=0.02,
+                  saturation=math.inf)  # fmt: skip
+    held = rig.configure(free)
+    assert held.travel[0] == pytest.approx(CEILINGS["TRAVEL_1"] / COUNTS)
+    assert held.travel[1] == math.inf
+    assert held.speed == pytest.approx([CEILINGS[f"SPEED_{i}"] / (COUNTS * 8e-3) for i in (1, 2)])
+    assert held.command == pytest.approx(CEILINGS["COMMAND"] / 100 * 10.0, abs=STEP)
+    assert held.saturation == pytest.approx(CEILINGS["SATURATION"] * 1e-3)
+
+
+@pytest.mark.parametrize(("at", "fault"), [(40_000, Fault(0)), (40_001, Fault.OVERTRAVEL)])
+def test_a_rig_without_limits_of_its_host_stops_at_its_ceiling(host, at, fault):
+    free = Limits(travel=(math.inf,) * 2, speed=(math.inf,) * 2, start=(math.inf,) * 2, command=10.0, watchdog=0.02)
+    board, rig = running(host, limits=free)
+    assert ramp(board, rig, (at, 0), 100).faults == fault
+    assert rig.exchange(10.0).applied == (0.0 if fault else pytest.approx(0.1 * CEILINGS["COMMAND"], abs=STEP))
+
+
+@pytest.mark.parametrize("mode", [Mode.IDLE, Mode.FAULT, Mode.ARMED])
+def test_a_converter_that_lost_its_zero_gets_it_again_in_the_next_tick(host, mode):
+    board, rig = running(host)
+    rig.exchange(1.0)
+    rig.estop() if mode == Mode.FAULT else rig.stop()
+    if mode == Mode.ARMED:
+        rig.arm()
+    board.do("glitch 12345")
+    assert board.state()[5] == 12345
+    board.do("run 1")
+    assert board.state()[5:] == [0.0, float(mode == Mode.ARMED), mode]
+
+
+@pytest.mark.parametrize("mode", [Mode.ARMED, Mode.HOST, Mode.MCU])
+def test_a_board_that_starts_anew_stands_in_a_fault_and_says_so(host, mode):
+    board, rig = running(host)
+    if mode != Mode.HOST:
+        rig.stop()
+        rig.arm()
+    if mode == Mode.MCU:
+        rig.start(mode, PULL)
+    rig.exchange(0.5)
+    board.do("reset")
+    assert dead(board)
+    tick = rig.exchange(0.5)
+    assert (tick.mode, tick.faults, tick.applied) == (Mode.FAULT, Fault.RESET, 0.0)
+    rig.clear_fault()
+    with pytest.raises(RigStopped, match="limits"):
+        rig.arm()
 
 
 def test_a_run_starts_within_its_window_only(host):
@@ -274,9 +439,9 @@ def test_a_command_that_answers_an_old_sample_is_not_followed(host):
     old = rig.exchange(0.1).tick
     for _ in range(20):
         assert rig.exchange(0.2).mode == Mode.HOST
-    line.write(pack(Kind.EXCHANGE, 200, exchange(1000, 0.0, old)))  # as it may lie in a driver's buffer
+    line.write(pack(Kind.EXCHANGE, 200, rig.session, exchange(1000.0, old)))  # as it may lie in a driver's buffer
     assert rig.exchange(0.2).mode == Mode.HOST  # 20 ticks old: the watchdog allows for as many
-    line.write(pack(Kind.EXCHANGE, 201, exchange(1000, 0.0, old)))
+    line.write(pack(Kind.EXCHANGE, 201, rig.session, exchange(1000.0, old)))
     tick = rig.exchange(0.2)
     assert tick.faults == Fault.STALE
     assert tick.applied == 0.0
@@ -350,7 +515,7 @@ def test_a_transition_that_no_encoder_makes_stops_the_rig(host):
     assert rig.exchange(7.0).faults == Fault.ENCODER
     assert dead(board)
     seen = rig.snapshot()
-    assert seen.asked == math.floor(7.0 / STEP + 0.5)
+    assert seen.command == math.floor(7.0 / STEP + 0.5)
     assert seen.sample.applied == math.floor(WIDE.command / STEP)
 
 
@@ -387,6 +552,52 @@ def test_gains_by_which_one_count_is_everything_are_refused(host):
             rig.start(Mode.MCU, law(beyond))
 
 
+@pytest.mark.parametrize(
+    ("growth", "taken"), [(1.0, True), (1.008, True), (1.02, False), (-1.02, False), (30.0, False)]
+)
+def test_a_law_that_grows_by_itself_is_refused(host, growth, taken):
+    """By 2.7 times in 125 samples, and in 50."""
+    board, rig = running(host)
+    rig.stop()
+    rig.arm()
+    if taken:
+        rig.start(Mode.MCU, law(0.0, z=growth))
+    else:
+        with pytest.raises(RigStopped, match="may not grow by itself"):
+            rig.start(Mode.MCU, law(0.0, z=growth))
+        assert dead(board)
+
+
+@pytest.mark.parametrize("turn", [0.3, math.pi / 1024, 3 * math.pi / 1024])
+@pytest.mark.parametrize(("size", "taken"), [(0.999, True), (1.025, False)])
+def test_a_law_that_swings_up_by_itself_is_refused_whatever_its_frequency(host, turn, size, taken):
+    """With pi/1024 a sample the trace of A^512 is 2 size^512 cos(pi/2) = 0."""
+    _, rig = running(host)
+    rig.stop()
+    rig.arm()
+    A = size * np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    swinging = Law(A, np.zeros((2, 2)), np.ones((1, 2)), np.zeros((1, 2)), initial=[1.0, 0.0])
+    if taken:
+        rig.start(Mode.MCU, swinging)
+    else:
+        with pytest.raises(RigStopped, match="may not grow by itself"):
+            rig.start(Mode.MCU, swinging)
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_count_that_stays_may_not_add_up_to_everything(host, share):
+    """A sum over 100 samples: 1/100 of the command from each, which an impulse of one sample does not show."""
+    _, rig = running(host)
+    rig.stop()
+    rig.arm()
+    adding = Law(np.eye(1), np.array([[share * WIDE.command * COUNTS / 100, 0.0]]), np.ones((1, 1)), np.zeros((1, 2)))
+    if share < 1:
+        rig.start(Mode.MCU, adding)
+    else:
+        with pytest.raises(RigStopped, match="one that stays"):
+            rig.start(Mode.MCU, adding)
+
+
 @pytest.mark.parametrize("path", PATHS)
 def test_a_count_that_is_everything_is_refused_whatever_way_it_takes(host, path):
     """By 1 % to either side of the limit; float32 rounds by a hundred-thousandth of that."""
@@ -404,7 +615,9 @@ def test_a_count_that_is_everything_is_refused_whatever_way_it_takes(host, path)
 
 
 def test_a_law_that_runs_away_stops_the_rig_before_its_number_overflows(host):
-    board, rig = running(host, Mode.MCU, replace(WIDE, saturation=math.inf), law(0.0, z=10.0))
+    growing = law(0.0, z=1.008)  # as fast as a board takes it
+    nearly = replace(growing, initial=[0.99 * 2**30 * STEP])  # 2^30 is beyond what it takes for a number
+    board, rig = running(host, Mode.MCU, replace(WIDE, saturation=math.inf), nearly)
     ticks = [rig.exchange(0.0) for _ in range(12)]
     assert ticks[-1].faults == Fault.GAINS
     assert dead(board)
@@ -459,7 +672,7 @@ def pulsed(host, ticks, watchdog=0.02):
     rig.configure(replace(WIDE, watchdog=watchdog, saturation=math.inf))
     rig.arm()
     board.do("run 5000")  # a long while armed
-    line.write(pack(Kind.SELF_TEST, 200, self_test_body(FULL, ticks)))
+    line.write(pack(Kind.SELF_TEST, 200, rig.session, self_test_body(FULL, ticks)))
     (reply,) = Parser().feed(line.read(1.0))
     read = status(reply.body)
     assert read is not None
@@ -550,7 +763,7 @@ def test_a_run_that_starts_during_a_self_test_starts_at_zero(host):
     rig.clear_fault()
     rig.configure(WIDE)
     rig.arm()
-    line.write(pack(Kind.SELF_TEST, 99, self_test_body(500, 50)))
+    line.write(pack(Kind.SELF_TEST, 99, rig.session, self_test_body(500, 50)))
     assert line.read(1.0)
     rig.exchange(0.0)
     assert board.state()[5] == 500

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from tests.pictures import unreadable
 from tests.report.pages import (
     blocks,
     design_page,
@@ -115,6 +116,12 @@ def test_every_table_has_headings_and_every_picture_words(chapter):
 
 
 @pytest.mark.slow
+def test_nothing_written_in_a_picture_is_cut_off_or_lies_on_something_else(chapter):
+    for picture in blocks(chapter, Picture):
+        assert (picture.name, unreadable(picture.draw())) == (picture.name, [])
+
+
+@pytest.mark.slow
 def test_paper_holds_the_verdict_and_every_number(chapter, tmp_path):
     pypdf = pytest.importorskip("pypdf")
     pytest.importorskip("typst")
@@ -188,7 +195,7 @@ def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
     found = (KeyNumber(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)
     made = [replace(page(tmp_path), key=e.key, findings=found)
             for page, e in zip((short_ladder_page, measured_response_page), EXPERIMENTS, strict=False)]  # fmt: skip
-    session = Session(make="", seed=7, folder=tmp_path, asked=EXPERIMENTS[:3], interrupted=True)
+    session = Session(make="", seed=7, folder=tmp_path, requested=EXPERIMENTS[:3], interrupted=True)
     session.results.extend(
         ExperimentResult(experiment=e, make="furuta", rig="Furuta pendulum", chapter=c, state="done", seconds=1.0)
         for e, c in zip(EXPERIMENTS, made, strict=False)

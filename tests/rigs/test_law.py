@@ -78,6 +78,19 @@ def test_one_count_through_a_memory_of_a_rig_is_390_volts():
     )
 
 
+@pytest.mark.parametrize(("growth", "refused"), [(1.0, False), (-1.0, False), (1.008, False), (1.009, True)])
+def test_a_law_that_grows_e_fold_within_123_samples_is_refused(growth, refused):
+    law = Law(np.array([[growth]]), np.zeros((1, 2)), np.ones((1, 1)), np.zeros((1, 2)))
+    assert ("its own memory is unstable" in absurdity(law, ABOUT, FREE)) == refused
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_count_that_stays_for_100_samples_may_not_add_up_to_the_whole_command(share):
+    law = Law(np.eye(1), np.array([[0.0, share * LIMIT * PER / 100]]), np.ones((1, 1)), np.zeros((1, 2)))
+    refused = absurdity(law, ABOUT, FREE)
+    assert ("one count that stays for 100 samples changes the command by 5.05 V" in refused) == (share > 1)
+
+
 def test_a_number_that_overflows_on_its_way_is_refused():
     A = np.array([[0.0, 0.0], [1e200, 0.0]])
     law = Law(A, np.array([[1e200, 0.0], [0.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros((1, 2)))

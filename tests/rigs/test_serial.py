@@ -31,8 +31,9 @@ class FakeBoard:
     def __init__(self, protocol=PROTOCOL, virtual=False, period=1000):
         self.now, self.tick, self.mode, self.faults, self.late = 0.0, 100, Mode.FAULT, Fault.RESET, 0
         self.counts, self.applied = [0, 0], 0
-        self.hello = struct.pack("<BBBBBHH", protocol, virtual, 2, 8, 0, period, STEPS) + b"fake"
+        self.hello = struct.pack("<BBBBBHH", protocol, virtual, 2, 8, 0, period, STEPS)
         self.asked: list[tuple[Kind, int, bytes, float]] = []
+        self.session, self.sessions = 0x0102, list[int]()
         self.lost: deque[bool] = deque()  # replies that do not come
         self.results: dict[Kind, Result] = {}
         self.alter = lambda kind, body: body
@@ -41,14 +42,15 @@ class FakeBoard:
         self._parser, self._replies = Parser(), b""
 
     def write(self, data):
-        for kind, sequence, body in self._parser.feed(data):
+        for kind, sequence, session, body in self._parser.feed(data):
             self.asked.append((Kind(kind), sequence, body, self.now))
+            self.sessions.append(session)
             reply = self._does(Kind(kind), body)
             if self.lost and self.lost.popleft():
                 continue
             result = self.results.get(Kind(kind), Result.DONE)
             head = struct.pack("<BBHI", result, self.mode, self.faults, self.tick)
-            self._replies += b"".join(self.before) + pack(kind | 0x80, sequence, head + reply)
+            self._replies += b"".join(self.before) + pack(kind | 0x80, sequence, self.session, head + reply)
             self.before = []
 
     def _does(self, kind, body):
@@ -56,7 +58,7 @@ class FakeBoard:
         self.mode = Mode(body[0]) if kind == Kind.START else modes.get(kind, self.mode)
         self.faults = {Kind.CLEAR: Fault(0), Kind.ESTOP: self.faults | Fault.STOP}.get(kind, self.faults)
         if kind == Kind.HELLO:
-            return self.hello
+            return self.hello + body[1:] + b"fake"
         if kind in (Kind.CONFIGURE, Kind.LAW):
             return self.alter(kind, body)
         if kind == Kind.EXCHANGE:
@@ -172,10 +174,10 @@ def test_what_answers_something_else_is_no_answer():
     sample = struct.pack("<Hiih", 0, 1, 2, 3)
     good = struct.pack("<BBHI", 0, 0, 0, 1) + sample
     board.before = [
-        pack(Kind.EXCHANGE | 0x80, sequence - 1, good),  # a late one
-        pack(Kind.STOP | 0x80, sequence, good),
-        pack(Kind.EXCHANGE, sequence, good),  # an echo
-        pack(Kind.EXCHANGE | 0x80, sequence, b"\x63" + good[1:]),  # of no result that there is
+        pack(Kind.EXCHANGE | 0x80, sequence - 1, 0, good),  # a late one
+        pack(Kind.STOP | 0x80, sequence, 0, good),
+        pack(Kind.EXCHANGE, sequence, 0, good),  # an echo
+        pack(Kind.EXCHANGE | 0x80, sequence, 0, b"\x63" + good[1:]),  # of no result that there is
         b"noise\0",
     ]
     assert rig.exchange(0.0).counts == (7, 8)
@@ -199,7 +201,7 @@ def test_a_command_goes_as_the_nearest_step_that_the_wire_has(command, steps):
     board = FakeBoard()
     rig = running(board)
     rig.exchange(command)
-    assert struct.unpack("<hfH", board.sent(Kind.EXCHANGE)[-1])[:2] == (steps, 0.0)
+    assert struct.unpack("<fI", board.sent(Kind.EXCHANGE)[-1])[0] == steps
 
 
 @pytest.mark.parametrize("mode", [Mode.IDLE, Mode.ARMED, Mode.FAULT])
@@ -207,14 +209,14 @@ def test_nothing_is_commanded_but_by_the_hosts_loop(mode):
     board = FakeBoard()
     rig = running(board, mode)
     rig.exchange(3.0)
-    assert struct.unpack("<hfH", board.sent(Kind.EXCHANGE)[-1])[:2] == (0, 0.0)
+    assert struct.unpack("<fI", board.sent(Kind.EXCHANGE)[-1])[0] == 0.0
 
 
 def test_the_boards_own_loop_gets_a_reference():
     board = FakeBoard()
     rig = running(board, Mode.MCU)
     rig.exchange(0.75)
-    assert struct.unpack("<hfH", board.sent(Kind.EXCHANGE)[-1])[:2] == (0, 0.75)
+    assert struct.unpack("<fI", board.sent(Kind.EXCHANGE)[-1])[0] == 0.75
 
 
 @pytest.mark.parametrize("mode", [Mode.HOST, Mode.MCU])
@@ -223,9 +225,7 @@ def test_what_is_no_number_goes_as_none_so_that_the_board_stops(mode, command):
     board = FakeBoard()
     rig = running(board, mode)
     rig.exchange(command)
-    steps, reference, _ = struct.unpack("<hfH", board.sent(Kind.EXCHANGE)[-1])
-    assert steps == 0
-    assert math.isnan(reference)
+    assert math.isnan(struct.unpack("<fI", board.sent(Kind.EXCHANGE)[-1])[0])
 
 
 def test_a_command_names_the_sample_that_it_answers_and_a_sample_its_time():
@@ -236,13 +236,13 @@ def test_a_command_names_the_sample_that_it_answers_and_a_sample_its_time():
     assert (tick.tick, tick.counts, tick.applied) == (0x2FFFF, (1500, -300), pytest.approx(-0.25))
     assert tick.time == pytest.approx(0x2FFFF * 1e-3 + 250e-6)
     rig.exchange(0.0)
-    assert struct.unpack("<hfH", board.sent(Kind.EXCHANGE)[-1])[2] == 0xFFFF  # its last 16 bits
+    assert struct.unpack("<fI", board.sent(Kind.EXCHANGE)[-1])[1] == 0x2FFFF
 
 
 def test_a_host_that_takes_four_ticks_counts_in_fours():
     board = FakeBoard()
     rig = running(board, period=4e-3)
-    assert board.sent(Kind.HELLO) == [b"\x01", b"\x04"]
+    assert [body[0] for body in board.sent(Kind.HELLO)] == [1, 4]
     board.tick = 407
     tick = rig.exchange(0.0)
     assert tick.tick == 102  # 408/4

@@ -278,13 +278,13 @@ def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
     source = f"data sheet of the {vendor}"
     make = make_of_vendor(vendor, plant)
     per = {"rad": (float(COUNTS), "1/rev")} | ({"m": (PER_METRE, "1/m")} if vendor == "ECP 210" else {})
-    said = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
-    said |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
+    numbers = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
+    numbers |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
     if unit in ("", "V"):
-        said |= {"converter": (CONVERTER, "V")} | ({"limit": (make.rig.limit, "V")} if make else {})
+        numbers |= {"converter": (CONVERTER, "V")} | ({"limit": (make.rig.limit, "V")} if make else {})
     far = () if make is None else (("travel", make.rig.travel), ("twist", make.rig.twist))
-    said |= {name: (value, driven_unit(type(plant))) for name, value in far if math.isfinite(value)}
-    return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in said.items()}
+    numbers |= {name: (value, driven_unit(type(plant))) for name, value in far if math.isfinite(value)}
+    return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in numbers.items()}
 
 
 def hardware_of_make(rig: Rig) -> Hardware:

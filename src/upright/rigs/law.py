@@ -13,6 +13,11 @@ from upright.laws import Law, Rule, at_work
 from upright.rigs.onboard import MEMORIES
 from upright.rigs.protocol import Capabilities, Limits
 
+STEP_SAMPLES = 100
+"""For which one count is held to see what a law's memories add up."""
+GROWTH = 64 ** (1 / 512)
+"""Largest size of a law's own pole: e-fold in no less than 123 samples."""
+
 
 def for_rig(law: Law | Rule, about: Capabilities, limits: Limits, target: Sequence[float] | None = None) -> Law | Rule:
     """The law with the rig's converter and the limits' command; with other targets of its readings, where given.
@@ -85,19 +90,26 @@ class RunningLaw:
         if reference is not None and row:
             row[0] = reference
         self.references = tuple(row)
-        given = readings if self._own else (*readings, *row)
+        inputs = readings if self._own else (*readings, *row)
         self.ticks += 1
-        return self._step((self.ticks - 1) * self.period if time is None else time, given)[0]
+        return self._step((self.ticks - 1) * self.period if time is None else time, inputs)[0]
 
 
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
     """Why no rig may be given these gains, as a clause; empty when it may.
 
-    Gains with which one count more or less moves the command by all that it may be, at once or through the law's
-    memories, amplify nothing but rounding. The firmware computes the same.
+    Gains with which one count moves the command by all that it may be, at once or through the law's memories, or held
+    for `STEP_SAMPLES`, amplify nothing but rounding. A law that grows by itself, faster than `GROWTH` a sample, runs
+    away while its command is limited. The firmware computes the same.
     """
     if isinstance(law, Rule):
         return ""
+    growth = float(np.abs(np.linalg.eigvals(law.A.reshape(law.A.shape[:2]))).max(initial=0.0))
+    if not growth <= GROWTH:
+        return (
+            f"its own memory is unstable: with nothing to read it grows {growth:.3g} times with each sample, and runs "
+            f"away while the command is limited (at most {GROWTH:.4g} times)"
+        )
     for k, response in enumerate(_impulse(law, len(about.coordinates))):
         for name, u, per in zip(about.coordinates, response, about.counts, strict=True):
             if not abs(u / per) < limits.command:
@@ -106,7 +118,25 @@ def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
                     f"its gain on {name} is absurd: one count changes the command by {abs(u / per):.3g} "
                     f"{about.command_unit}{later}, and {limits.command:g} {about.command_unit} is all that it may be"
                 )
+    held = _step(law, len(about.coordinates))
+    for name, u, per in zip(about.coordinates, held, about.counts, strict=True):
+        if not abs(u / per) < limits.command:
+            return (
+                f"its gain on {name} is absurd: one count that stays for {STEP_SAMPLES} samples changes the command by "
+                f"{abs(u / per):.3g} {about.command_unit}, and {limits.command:g} {about.command_unit} is all that it "
+                "may be"
+            )
     return ""
+
+
+def _step(law: Law, readings: int) -> list[float]:
+    """Largest command within `STEP_SAMPLES` after each reading has gone from 0 to 1, from memories at zero."""
+    A, B, C, D = (m.reshape(m.shape[:2]) for m in (law.A, law.B, law.C, law.D))
+    z, most = np.zeros((len(A), readings)), np.zeros(readings)
+    for _ in range(STEP_SAMPLES + 1):
+        most = np.maximum(most, np.abs((C @ z + D[:, :readings])[0]))
+        z = A @ z + B[:, :readings]
+    return most.tolist()
 
 
 def _impulse(law: Law, readings: int) -> Iterator[list[float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 import time
 from collections.abc import Callable, Sequence
 from typing import NoReturn
@@ -10,7 +11,7 @@ from typing import NoReturn
 from upright.errors import BadInput, RigStopped
 from upright.laws import Law
 from upright.rigs import wire
-from upright.rigs.board import told
+from upright.rigs.board import fault_text
 from upright.rigs.driver import Connection, Driver
 from upright.rigs.line import Line, open_line
 from upright.rigs.onboard import onboard, ticks
@@ -18,7 +19,9 @@ from upright.rigs.protocol import LONGEST_PULSE, NO_FAULT, Capabilities, Fault, 
 from upright.rigs.wire import Kind, Packet, Result, Status
 
 _AGAIN = 0.02  # s; after which a request is repeated, as long as there is no watchdog that would not wait for it
+_LOOKS_AT_A_LAW = 0.4  # s; a small processor, before it answers
 _TRIES = 4  # repetitions within the watchdog's time
+_REFUSAL_OF_VERSION_1 = 4  # bytes of it, where a body stands now
 _BOOT = 4.0  # s; a board that resets when its port is opened waits for its boot loader
 
 _WHY = {
@@ -29,6 +32,7 @@ _WHY = {
     Result.FAULTED: "it stands in a fault that has to be cleared first",
     Result.OFF_START: "it is off its start window",
     Result.UNKNOWN: "it does not know that request; is its firmware as old as this program?",
+    Result.WRONG_SESSION: "it was stopped, cleared or reset since it answered last, and has to be set up again",
 }
 
 
@@ -57,6 +61,8 @@ class SerialRig:
         How long an answer may take before the link is taken for lost [s].
     lockstep : bool
         Whether the board is simulated in lockstep although its firmware does not know it.
+    nonce : callable
+        Numbers of 32 bits to greet a board with, so that an old answer is not taken for its own.
     resend : float, optional
         After which time a request is repeated [s]; by default a quarter of the watchdog's time, so that it stands a
         few frames lost in a row, and never in lockstep, where time passes by it.
@@ -77,6 +83,7 @@ class SerialRig:
         lockstep: bool = False,
         resend: float | None = None,
         clock: Callable[[], float] = time.monotonic,
+        nonce: Callable[[], int] = lambda: secrets.randbits(32),
     ) -> None:
         if not 1 <= len(coordinates) <= wire.CHANNELS or len(counts) != len(coordinates):
             raise BadInput(
@@ -89,6 +96,7 @@ class SerialRig:
         self._coordinates, self._counts = tuple(coordinates), tuple(float(n) for n in counts)
         self._unit, self._full_scale, self._period = command_unit, full_scale, period
         self._patience, self._lockstep, self._resend, self._clock = patience, lockstep, resend, clock
+        self._nonce, self._session = nonce, 0
         self._again = math.inf
         self._parser = wire.Parser()
         self._sequence = 0
@@ -102,6 +110,11 @@ class SerialRig:
     def dropped(self) -> int:
         """Frames that came damaged since the port was opened."""
         return self._parser.dropped
+
+    @property
+    def session(self) -> int:
+        """As the board's last answer counts it."""
+        return self._session
 
     def open(self) -> Capabilities:
         """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
@@ -118,7 +131,7 @@ class SerialRig:
         if hello.protocol != wire.PROTOCOL:
             raise RigStopped(
                 f"The firmware '{hello.name}' speaks version {hello.protocol} of the protocol and this program version "
-                f"{wire.PROTOCOL}; flash the firmware of this release."
+                f"{wire.PROTOCOL}; flash the firmware of this release (upright firmware flash)."
             )
         virtual = self._lockstep or hello.virtual
         self._again = self._resend or (math.inf if virtual else _AGAIN)
@@ -131,16 +144,21 @@ class SerialRig:
 
     def _greet(self, every: int) -> wire.Hello:
         """What the firmware says of itself when it is told how many ticks there are between two exchanges."""
-        hello = self._hello = wire.hello(self._ask(Kind.HELLO, bytes((every,)), max(_BOOT, self._patience)))
+        greeting = wire.greeting(every, nonce := self._nonce())
+        hello = self._hello = wire.hello(self._ask(Kind.HELLO, greeting, max(_BOOT, self._patience)))
+        if hello.protocol == wire.PROTOCOL and hello.nonce != nonce:
+            raise RigStopped(f"{self._name()} answers another program; end that first.")
         self._tick = 1e-6 * hello.period
         return hello
 
     def configure(self, limits: Limits) -> Limits:
-        """Hold limits, rounded towards the safe side to counts, steps and ticks; what came back is compared."""
-        asked = self._on_wire(limits)
-        held = self._ask(Kind.CONFIGURE, asked.body())
-        if held != asked.body():
-            self._distrust("limits", wire.limits(held), asked)
+        """Hold limits, rounded towards the safe side to counts, steps and ticks, and to the ceilings that the board was
+        compiled with; what came back is compared.
+        """
+        requested = self._on_wire(limits)
+        held = self._ask(Kind.CONFIGURE, requested.body())
+        if not wire.limits(held).within(requested):
+            self._distrust("limits", wire.limits(held), requested)
         if self._resend is None and math.isfinite(self._again):
             self._again = min(_AGAIN, limits.watchdog / _TRIES)
         return self._from_wire(wire.limits(held))
@@ -192,8 +210,9 @@ class SerialRig:
                 if self._status.result != Result.WRONG_VALUE:
                     raise
                 raise self._refusal(
-                    "the law's numbers are absurd: one count more or less may not move the command by all that it may "
-                    "be, and none may reach 2^30 in counts and steps; look at gains and units"
+                    "the law's numbers are absurd: one count, or one that stays, may not move the command by all that "
+                    "it may be, its memory may not grow by itself, and none may reach 2^30 in counts and steps; look "
+                    "at gains and units"
                 ) from None
             if held != body:
                 self._distrust("law", held.hex(), body.hex())
@@ -202,17 +221,17 @@ class SerialRig:
     def exchange(self, command: float) -> Tick:
         """Hand a command over and take the sample of the next tick; faults are in the sample."""
         c = self._there()
-        reference, steps = 0.0, 0
+        value = 0.0
         if not math.isfinite(command):
-            reference = math.nan  # the firmware stops on it
+            value = math.nan  # the firmware stops on it
         elif self._status.mode == Mode.MCU:
-            reference = command
+            value = command
         elif self._status.mode == Mode.HOST:
-            steps = self._steps(command)
+            value = float(self._steps(command))
         try:
-            body = wire.exchange(steps, reference, self._status.tick)
+            body = wire.exchange(value, self._status.tick)
         except OverflowError:
-            body = wire.exchange(steps, math.nan, self._status.tick)
+            body = wire.exchange(math.nan, self._status.tick)
         sample = wire.sample(self._ask(Kind.EXCHANGE, body))
         self._at = sample.counts[: len(self._counts)]
         return Tick(
@@ -238,8 +257,13 @@ class SerialRig:
                 return  # the watchdog does it then
 
     def clear_fault(self) -> None:
-        """Forget faults."""
-        self._ask(Kind.CLEAR)
+        """Forget faults, those too that came since it answered last."""
+        try:
+            self._ask(Kind.CLEAR)
+        except RigStopped:
+            if self._status.result != Result.WRONG_SESSION:
+                raise
+            self._ask(Kind.CLEAR)
 
     def close(self) -> None:
         """Stop and let go of the line."""
@@ -264,14 +288,14 @@ class SerialRig:
             raise RigStopped("The rig is not open; open it first.")
         now = again = self._clock()
         patience = self._patience if patience is None else patience
-        given_up = now + patience
+        deadline = now + patience
         # An exchange that is repeated is a new one; anything else is done once, however often it is asked for.
         self._sequence = (self._sequence + 1) & 0xFF
-        while now < given_up:
+        while now < deadline:
             if now >= again:
-                line.write(wire.pack(kind, self._sequence, body))
-                again = now + self._again
-            for frame in self._parser.feed(line.read(min(again, given_up) - now)):
+                line.write(wire.pack(kind, self._sequence, self._session, body))
+                again = now + (self._again if kind != Kind.LAW else max(self._again, _LOOKS_AT_A_LAW))
+            for frame in self._parser.feed(line.read(min(again, deadline) - now)):
                 answer = self._answer(frame, kind)
                 if answer is not None:
                     return answer
@@ -285,10 +309,16 @@ class SerialRig:
         """What a frame says to the last request; None when it is no answer to that."""
         if not frame.answers(kind) or frame.sequence != self._sequence:
             return None
+        if kind == Kind.HELLO and len(frame.body) == _REFUSAL_OF_VERSION_1:
+            raise RigStopped(
+                f"{self._name()} speaks version 1 of the protocol and this program version "
+                f"{wire.PROTOCOL}; flash the firmware of this release (upright firmware flash)."
+            )
         read = wire.status(frame.body)
         if read is None:
             return None
         self._status, rest = read
+        self._session = frame.session
         if self._status.result == Result.DONE:
             return rest
         if self._status.result == Result.OFF_START:
@@ -373,16 +403,18 @@ class SerialRig:
             return self._about.name
         return f"The board on {self._line.name}" if self._line is not None else "The board"
 
-    def _distrust(self, what: str, held: object, asked: object) -> NoReturn:
+    def _distrust(self, what: str, held: object, requested: object) -> NoReturn:
         self.estop()
-        raise self._refusal(f"it holds another {what} than it was given ({held} instead of {asked})")
+        raise self._refusal(f"it holds another {what} than it was given ({held} instead of {requested})")
 
     def _stopped(self) -> RigStopped:
-        return RigStopped(f"{self._name()} stopped: {told(self._status.faults)}. Look at it before it is cleared.")
+        return RigStopped(
+            f"{self._name()} stopped: {fault_text(self._status.faults)}. Look at it before it is cleared."
+        )
 
     def _refusal(self, why: str) -> RigStopped:
         faults = self._status.faults
-        state = f" It is in {self._status.mode.name}" + (f": {told(faults)}." if faults != NO_FAULT else ".")
+        state = f" It is in {self._status.mode.name}" + (f": {fault_text(faults)}." if faults != NO_FAULT else ".")
         return RigStopped(f"{self._name()} refused: {why}.{state}")
 
 

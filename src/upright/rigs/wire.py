@@ -1,8 +1,14 @@
 """Frames between a host and the firmware: packed, checked, and taken apart again from whatever comes over a wire.
 
-``COBS(kind u8 | sequence u8 | body | CRC32) 0x00``, least byte first, with the CRC32 of `zlib`: a zero byte ends a
-frame and stands nowhere else, so that a reader finds its place again after any garbage. A request is answered by a
-frame of its kind plus 0x80 and its sequence number. Every reply begins with a `Status`.
+``0x00 COBS(kind u8 | sequence u8 | session u16 | body | CRC32) 0x00``, least byte first, with the CRC32 of `zlib`: a
+zero byte stands before and behind a frame and nowhere else, so that a reader finds its place again after any garbage,
+and noise between two frames costs neither. A request is answered by a frame of its kind plus 0x80 and its sequence
+number. Every reply begins with a `Status`.
+
+The session is the board's: its answer to `Kind.HELLO` begins one with a number that no earlier frame names, and every
+request that it does, and every fault, counts it on. A request has to name it, but for those that stop (STOP, ESTOP),
+look (SNAPSHOT) or greet: what was asked once and is heard again, out of a buffer or from somebody who recorded it, is
+not done again.
 """
 
 from __future__ import annotations
@@ -16,10 +22,10 @@ from typing import NamedTuple
 from upright.errors import BadInput
 from upright.rigs.protocol import Fault, Mode
 
-PROTOCOL = 1
+PROTOCOL = 2
 """Version that both ends must speak."""
 LONGEST = 250
-"""Bytes of kind, sequence and body together; with the CRC that is one block of COBS."""
+"""Bytes of kind, sequence, session and body together; with the CRC that is one block of COBS."""
 NO_LIMIT = 0x7FFFFFFF
 """Of a coordinate that may do what it likes."""
 FOREVER = 0xFFFFFFFF
@@ -28,6 +34,7 @@ CHANNELS = 2
 MOST = 32767
 """Largest command [steps]; of a converter of 16 bits one less than it has to either side."""
 _CRC = struct.Struct("<I")
+_HEAD = struct.Struct("<BBH")
 _REPLY = 0x80
 
 
@@ -59,6 +66,7 @@ class Result(IntEnum):
     FAULTED = 5
     OFF_START = 6
     UNKNOWN = 7
+    WRONG_SESSION = 8
 
 
 class Packet(NamedTuple):
@@ -66,6 +74,7 @@ class Packet(NamedTuple):
 
     kind: int
     sequence: int
+    session: int
     body: bytes
 
     def answers(self, kind: Kind) -> bool:
@@ -92,23 +101,24 @@ def from_cobs(data: bytes) -> bytes | None:
     return bytes(out)
 
 
-def pack(kind: int, sequence: int, body: bytes = b"") -> bytes:
+def pack(kind: int, sequence: int, session: int = 0, body: bytes = b"") -> bytes:
     """Frame as it goes over the wire."""
-    payload = bytes((kind, sequence & 0xFF)) + body
+    payload = _HEAD.pack(kind, sequence & 0xFF, session) + body
     if len(payload) > LONGEST:
-        raise BadInput(f"a frame holds up to {LONGEST - 2} bytes, got {len(body)}.")
-    return cobs(payload + _CRC.pack(zlib.crc32(payload))) + b"\0"
+        raise BadInput(f"a frame holds up to {LONGEST - _HEAD.size} bytes, got {len(body)}.")
+    return b"\0" + cobs(payload + _CRC.pack(zlib.crc32(payload))) + b"\0"
 
 
 def unpack(stuffed: bytes) -> Packet | None:
     """What stands between two zeros, or None when it is no sound frame."""
     data = from_cobs(stuffed)
-    if data is None or len(data) < 2 + _CRC.size:
+    if data is None or len(data) < _HEAD.size + _CRC.size:
         return None
     payload = data[: -_CRC.size]
     if _CRC.unpack_from(data, len(payload))[0] != zlib.crc32(payload):
         return None
-    return Packet(payload[0], payload[1], payload[2:])
+    kind, sequence, session = _HEAD.unpack_from(payload)
+    return Packet(kind, sequence, session, payload[_HEAD.size :])
 
 
 class Parser:
@@ -168,7 +178,9 @@ class Readout(NamedTuple):
 
 
 class Hello(NamedTuple):
-    """What the firmware says of itself; its tick's period in us, its converter's steps from zero to full scale."""
+    """What the firmware says of itself; its tick's period in us, its converter's steps from zero to full scale, and the
+    number that it was greeted with.
+    """
 
     protocol: int
     virtual: bool
@@ -177,6 +189,7 @@ class Hello(NamedTuple):
     reset_cause: int
     period: int
     steps: int
+    nonce: int
     name: str
 
 
@@ -192,6 +205,12 @@ class LimitsOnWire:
     saturation: int
     watchdog: int
     command: int
+
+    def within(self, other: LimitsOnWire) -> bool:
+        """Whether nothing is wider than in other limits."""
+        mine, its = (_LIMITS.unpack(limits.body()) for limits in (self, other))
+        frozen = all(0 < a <= b or a == b for a, b in zip(self.frozen, other.frozen, strict=True))  # 0 looks at nothing
+        return frozen and all(a <= b for k, (a, b) in enumerate(zip(mine, its, strict=True)) if k not in (6, 7))
 
     def body(self) -> bytes:
         """As the firmware reads it."""
@@ -213,16 +232,17 @@ class Snapshot(NamedTuple):
     tick: int
     sample: Readout
     moved: tuple[int, int]
-    asked: int
+    command: int
     lost: int
     dropped: int
 
 
 _STATUS = struct.Struct("<BBHI")
 _SAMPLE = struct.Struct("<Hiih")
-_HELLO = struct.Struct("<BBBBBHH")
+_HELLO = struct.Struct("<BBBBBHHI")
 _LIMITS = struct.Struct("<10IHh")
-_EXCHANGE = struct.Struct("<hfH")
+_EXCHANGE = struct.Struct("<fI")
+_GREETING = struct.Struct("<BI")
 _SELF_TEST = struct.Struct("<hH")
 _SNAPSHOT_HEAD = struct.Struct("<BHI")
 _SNAPSHOT_TAIL = struct.Struct("<iihHH")
@@ -262,13 +282,20 @@ def snapshot(body: bytes) -> Snapshot:
     """Of a reply to `Kind.SNAPSHOT`, after its status."""
     mode, faults, tick = _SNAPSHOT_HEAD.unpack_from(body)
     at, end = _SNAPSHOT_HEAD.size, _SNAPSHOT_HEAD.size + _SAMPLE.size
-    first, second, asked, lost, dropped = _SNAPSHOT_TAIL.unpack_from(body, end)
-    return Snapshot(Mode(mode), Fault(faults), tick, sample(body[at:end]), (first, second), asked, lost, dropped)
+    first, second, command, lost, dropped = _SNAPSHOT_TAIL.unpack_from(body, end)
+    return Snapshot(Mode(mode), Fault(faults), tick, sample(body[at:end]), (first, second), command, lost, dropped)
 
 
-def exchange(command: int, reference: float, answers: int) -> bytes:
-    """Body of `Kind.EXCHANGE`: command [steps], reference [rad or m], tick of the sample that they answer."""
-    return _EXCHANGE.pack(command, reference, answers & 0xFFFF)
+def exchange(value: float, answers: int) -> bytes:
+    """Body of `Kind.EXCHANGE`: command [steps], or reference [rad or m] of the board's own loop, and the tick of the
+    sample that it answers.
+    """
+    return _EXCHANGE.pack(value, answers)
+
+
+def greeting(every: int, nonce: int) -> bytes:
+    """Body of `Kind.HELLO`: ticks from one answer to the next, and a number that the answer repeats."""
+    return _GREETING.pack(every, nonce)
 
 
 def self_test_body(pulse: int, ticks: int) -> bytes:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,9 @@ from upright.simulation import gpu
 from upright.simulation.kernel.compiled import WIDTH, Kernel, compiling, kernel
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
+
+if TYPE_CHECKING:
+    from upright.simulation.lowering.webassembly import Wasm
 
 Array = NDArray[np.float64]
 Device = Literal["cpu", "gpu"]
@@ -245,6 +248,61 @@ class Simulator:
         """
         if device not in ("cpu", "gpu"):
             raise BadInput(f"motions are computed on device 'cpu' or 'gpu', got {device!r}.")
+        width = 1 if (params.ndim == 2 and params.shape[1] == 1) or device == "gpu" else WIDTH
+        call = self.call(
+            params, x0, u, samples=samples, start=start, every=every, settle=settle, memory=memory, width=width
+        )
+        motion = call.out if self.flavour.record else call.reduced
+        if device == "gpu":
+            with compiling(self.loop):
+                gpu.launch(
+                    gpu.door(), lambda: self._kernel.ptx(call.room), call.lanes, call.arguments,
+                    results=(call.out, call.reduced),
+                )  # fmt: skip
+            return motion
+        with compiling(self.loop):
+            compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
+            events = self._kernel.events if self.flavour.dry else 0
+
+        def step(first: int, last: int) -> None:
+            compiled(first, last, *call.arguments, aligned(call.room), events)
+
+        if threads <= 1 or call.blocks < 2 * threads:
+            step(0, call.blocks)
+        else:
+            take_turns(step, call.blocks, threads)
+        return motion[..., : call.lanes]
+
+    def wasm(self, width: int) -> Wasm:
+        """The kernel for a page or Node, to be called with what `call` says.
+
+        Raises
+        ------
+        BadInput
+            When a rule, or the plant, cannot be compiled for a page.
+        """
+        with compiling(self.loop):
+            return self._kernel.wasm(f"run_{width}")
+
+    @property
+    def rows(self) -> Mapping[str, int]:
+        """Place of each number of a lane in the working array: ``W[place * width + lane]``."""
+        return self._layout.rows
+
+    def call(
+        self,
+        params: Array,
+        x0: Array,
+        u: Array | None = None,
+        *,
+        samples: int,
+        width: int,
+        start: NDArray[np.int64] | None = None,
+        every: int = 1,
+        settle: float = 0.0,
+        memory: Array | None = None,
+    ) -> Call:
+        """What the kernel is called with, in blocks of `width` lanes; arguments and errors as for `run`."""
         n, nu, f = self._layout.n, self._layout.nu, self.flavour
         lanes = params.shape[1] if params.ndim == 2 else 0
         if lanes == 0 or params.shape[0] != len(self.names):
@@ -256,9 +314,9 @@ class Simulator:
         if samples < 1 or every < 1:
             raise BadInput(f"samples and every must be at least 1, got {samples} and {every}.")
         u = np.zeros((0, nu)) if u is None else np.require(u, np.float64, _KIND)
+        steps = int((samples - 1) * every)
         if u.ndim != 2 or u.shape[1] != nu:
             raise BadInput(f"u needs shape (T, {nu}): time first, one column for each input; got {u.shape}.")
-        width = 1 if lanes == 1 or device == "gpu" else WIDTH
         blocks = -(-lanes // width)
         law = _NONE[0] if self.loop is None else self.loop.rows(nu, lanes, x0[: 2 * n : 2])
         P = ready(params, blocks * width) if self.loop is None else padded(params, blocks * width, extra=len(law))
@@ -292,25 +350,37 @@ class Simulator:
             out = recorded((samples, 2 * n + (nu if f.loop else 0) + self.carried, blocks * width), memory)
         else:
             reduced = np.empty((4 * n + nu, blocks * width))
-        size = room(self._layout, width, buffer)
-        call = (lanes, P, X0, u, self._reference, begin, self._grid, base, int((samples - 1) * every), int(every))
-        call += (int(self.substeps), float(self.dt), scalars, buffer, out, reduced)
-        if device == "gpu":
-            with compiling(self.loop):
-                gpu.launch(gpu.door(), lambda: self._kernel.ptx(size), lanes, call, results=(out, reduced))
-            return out if f.record else reduced
-        with compiling(self.loop):
-            compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
-            events = self._kernel.events if f.dry else 0
+        return Call(
+            arguments=(
+                lanes, P, X0, u, self._reference, begin, self._grid, base, 0, steps + 1, steps, int(every),
+                int(self.substeps), float(self.dt), scalars, buffer, out, reduced,
+            ),
+            lanes=lanes, blocks=blocks, out=out, reduced=reduced, room=room(self._layout, width, buffer),
+        )  # fmt: skip
 
-        def step(first: int, last: int) -> None:
-            compiled(first, last, *call, aligned(size), events)
 
-        if threads <= 1 or blocks < 2 * threads:
-            step(0, blocks)
-        else:
-            take_turns(step, blocks, threads)
-        return out[:, :, :lanes] if f.record else reduced[:, :lanes]
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Call:
+    """What a kernel is called with.
+
+    Attributes
+    ----------
+    arguments : tuple of int, float or array
+        Those of `lanes.RUN_ARGUMENTS` from ``_total`` to ``STAT``.
+    lanes, blocks : int
+        Lanes, and blocks of them.
+    out, reduced : array
+        Those of the arguments that the kernel writes: the motion, or what it reduces to.
+    room : int
+        Size of the working array ``W``.
+    """
+
+    arguments: tuple[int | float | Array | NDArray[np.int64], ...]
+    lanes: int
+    blocks: int
+    out: Array
+    reduced: Array
+    room: int
 
 
 def ready(a: Array, width: int) -> Array:

@@ -99,16 +99,26 @@ def test_a_constant_stands_in_the_middle_of_an_axis_of_some_height(value):
     assert high - low < 1e-3 * max(abs(value), 1.0)
 
 
-@pytest.mark.parametrize("largest", [0.16, 0.27, 1.6, 4e-5])
-def test_the_ticks_of_a_residual_say_where_they_are(largest):
+@pytest.mark.parametrize(("largest", "round_one"), [(0.16, 0.1), (0.27, 0.2), (1.6, 1.0), (4e-5, 2e-5), (0.5, 0.5)])
+def test_the_ticks_of_a_residual_say_where_they_are(largest, round_one):
     y = np.zeros((4, 1))
     off = largest * np.array([[1.0], [-1.0], [0.3], [0.0]])
     panel = fit_figure(replace(SCORE, y=y, simulated=y - off, measured=("theta",))).axes[1]
     ticks = panel.yaxis.get_major_locator()()
+    # 1, 2 or 5 of a decade, on either side: more would lie on one another
+    assert list(ticks) == pytest.approx([-round_one, round_one])
     for at in ticks:
         said = panel.yaxis.get_major_formatter()(at).replace("−", "-").replace("·10", "e")
         said = said.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
         assert float(said) == pytest.approx(at, rel=1e-9, abs=1e-15)
+
+
+def test_a_residual_that_is_off_throughout_stands_off_from_zero():
+    y = np.zeros((4, 1))
+    off = np.array([[5.3], [5.4], [5.5], [5.6]])
+    panel = fit_figure(replace(SCORE, y=y, simulated=y - off, measured=("theta",))).axes[1]
+    assert panel.get_ylim()[0] < 0 < 5.6 < panel.get_ylim()[1]
+    assert list(panel.yaxis.get_major_locator()()) == [5.0]
 
 
 def alternating(n, start=2.0, step=0.01):

@@ -152,12 +152,25 @@ def test_scores_stand_signal_by_signal_fitted_runs_first():
 def test_what_a_score_is_compared_with_has_a_column_where_it_is_known():
     compared = score(horizon=0.5, naive={"theta": 40.0}, black_box={"psi": 50.0}, band={"theta": np.full(5, 0.1)})
     table = score_table({"a": compared, "b": score()})
-    assert table.headings == ("run", "role", "signal", "fit", "held speed", "black box", "in 90 % band", "simulated")
+    assert table.headings == (
+        "run", "role", "signal", "fit, free run", "fit, ahead", "held speed", "black box", "in 90 % band", "simulated",
+    )  # fmt: skip
+    assert [cells(table, i)["fit, free run"] for i in range(4)] == ["", "", "90.0 %", "80.0 %"]
+    assert [cells(table, i)["fit, ahead"] for i in range(4)] == ["90.0 %", "80.0 %", "", ""]
     assert [cells(table, i)["held speed"] for i in range(4)] == ["40.0 %", "", "", ""]
     assert [cells(table, i)["black box"] for i in range(4)] == ["", "50.0 %", "", ""]
     assert [cells(table, i)["in 90 % band"] for i in range(4)] == ["100.00 %", "", "", ""]
     assert cells(table)["simulated"] == "restarted every 0.5 s"
-    assert table.numbers == (3, 4, 5, 6)
+    assert table.numbers == (3, 4, 5, 6, 7)
+
+
+def test_what_the_start_state_allows_stands_beside_every_horizon():
+    ahead = {0.1: {"theta": 90.0}, 0.5: {"theta": 60.0}}
+    table = score_table({"a": score(horizon=0.1, ahead=ahead, ceiling={0.1: {"theta": 95.0}, 0.5: {"theta": 70.0}})})
+    assert [(r[2], r[3], r[4]) for r in table.rows if r[2] == "θ"] == [
+        ("θ", "90.0 %", "95.0 %"),
+        ("θ", "60.0 %", "70.0 %"),
+    ]
 
 
 def test_further_horizons_have_rows_of_their_own_that_nothing_is_compared_with():

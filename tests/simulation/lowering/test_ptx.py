@@ -41,10 +41,10 @@ def test_the_code_is_one_kernel_and_all_it_needs(case, record):
 
 
 def test_the_kernel_takes_what_the_launch_gives():
-    """35 words of 8 bytes: six numbers, ten arrays, and their nineteen sizes."""
+    """37 words of 8 bytes: eight numbers, ten arrays, and their nineteen sizes."""
     head = ptx("smooth").split(".entry lanes(")[1].split("\n)")[0]
     kinds = re.findall(r"\.param \.(\w)64", head)
-    assert len(kinds) == len(words()) == 6 + 10 + 19
+    assert len(kinds) == len(words()) == 8 + 10 + 19
     assert [k for k, kind in enumerate(kinds) if kind == "f"] == [
         k for k, word in enumerate(words()) if word.__name__ == "c_double"
     ]

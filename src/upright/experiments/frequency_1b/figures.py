@@ -89,7 +89,7 @@ def _residuals(upper: Any, lower: Any, answer: FrequencyFit, j: int, *, first: b
         lower.plot(data.omega, np.degrees(np.imag(off)), mark, color=colour, markersize=2.6)
     for axes, label in ((upper, "magnitude\nleft [%]"), (lower, "phase\nleft [deg]")):
         axes.axhline(0, color=GREY, linewidth=0.6)
-        axes.set_yscale("symlog", linthresh=0.1, linscale=0.6)
+        axes.set_yscale("symlog", linthresh=0.1, linscale=1.0)
         axes.set_ylim(*(f * max(0.15, float(np.max(np.abs(axes.get_ylim())))) for f in (-1.6, 1.6)))
         _decades(axes)
         if first:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.identification.inference.bands import banded
+from upright.identification.inference.ceiling import ceilings, judged
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.intervals import run_estimates
 from upright.identification.model.bands import Bands
@@ -41,13 +42,17 @@ def fit_percent(y: ArrayLike, simulated: ArrayLike) -> float:
     return max(-1000.0, score) if math.isfinite(score) else -1000.0
 
 
-def score_run(problem: Problem, index: int, x: Array) -> RunScore:
-    """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end."""
+def score_run(problem: Problem, index: int, x: Array, seconds: float | None = None) -> RunScore:
+    """Score of one run for coordinates `x`; windows restarted from measured states are laid end to end.
+
+    One that a filter predicts is scored so many `seconds` ahead, as far as runs are judged when omitted.
+    """
     track = problem.tracks[index]
     run = track.run
-    y = problem.simulate(index, x[:, None], track.length)[..., 0]
     if track.ahead:
-        return _score_ahead(problem, index, x, y, track.ahead)
+        here = judged(problem, x) if seconds is None else None
+        return _score_ahead(problem, index, x, track.ahead, here.seconds if here is not None else seconds or track.dt)
+    y = problem.simulate(index, x[:, None], track.length)[..., 0]
     if not track.windowed:
         t, measured, simulated = run.t, track.y, y[:, 0, :]
     else:
@@ -65,19 +70,31 @@ def score_run(problem: Problem, index: int, x: Array) -> RunScore:
     )  # fmt: skip
 
 
-def _score_ahead(problem: Problem, index: int, x: Array, y: Array, plan: FilterPlan) -> RunScore:
-    """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart."""
-    track = problem.tracks[index]
-    run = track.run
-    weight = plan.weight[:, None, None]
-    foreseen, measured = y / weight, track.targets(track.length) / weight
+def _score_ahead(problem: Problem, index: int, x: Array, plan: FilterPlan, seconds: float) -> RunScore:
+    """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart.
+
+    Beside it stand the horizons that were asked for, each with what the start state allows.
+    """
+    requested = problem.tracks[index]
+    run, weight = requested.run, plan.weight[:, None, None]
+    y = problem.simulate(index, x[:, None], requested.length)[..., 0] / weight
+    targets = requested.targets(requested.length) / weight
+    percents = {h: _percents(run, targets[i], y[i]) for i, h in enumerate(run.horizons)}
+    near = problem.ahead(seconds)
+    track = near.tracks[index]
+    foreseen, measured = near.simulate(index, x[:, None], 1)[0, ..., 0], track.targets(1)[0]
     position, speed = problem.filtered(index, x)
-    naive = position + speed * (track.dt * plan.samples[0])
-    ahead = {h: _percents(run, measured[i], foreseen[i]) for i, h in enumerate(run.horizons)}
+    samples = round(seconds / track.dt)
+    percents[seconds] = _percents(run, measured, foreseen)
+    horizons = sorted(percents)
+    allowed = ceilings(problem, index, x, [max(1, round(h / track.dt)) for h in horizons])
+    limits = [{run.measured[k]: float(row[k]) for k in run.free} for row in allowed]
     return RunScore(
-        role=run.role, fit_percent=ahead[run.horizons[0]], horizon=run.horizons[0],
-        t=run.t[track.restarts + plan.samples[0]], y=measured[0], simulated=foreseen[0], measured=run.measured,
-        naive=_percents(run, measured[0], naive), ahead=ahead,
+        role=run.role, fit_percent=percents[seconds], horizon=seconds, t=run.t[track.restarts + samples], y=measured,
+        simulated=foreseen, measured=run.measured,
+        naive=_percents(run, measured, position + speed * (track.dt * samples)),
+        ahead={h: percents[h] for h in horizons},
+        ceiling=dict(zip(horizons, limits, strict=True)),
     )  # fmt: skip
 
 
@@ -139,6 +156,12 @@ def predict(
     return {run.label: _predict(known, run, groups or {}, bands, progress) for run in runs}
 
 
+def _promised(run: Run, bands: Bands | None) -> float | None:
+    """How far ahead a filtered run is judged: as far as the fitted ones were, if it looks as far."""
+    parts = () if bands is None or not run.filtered else (s for spreads in bands.spreads.values() for s in spreads)
+    return max((s.horizon for s in parts if 0 < s.horizon <= run.horizons[-1]), default=None)
+
+
 def _either_side(problem: Problem) -> list[Array]:
     """Starts with a gain of the run's own that is somewhat smaller, and larger, than is typical.
 
@@ -166,7 +189,8 @@ def _predict(
 ) -> RunScore:
     """Score of one run, with its band, and the factor of its own that would mend it where it falls short."""
     run = with_trip_guesses(rig, run)
-    plain, problem, x = _foresee(rig, run, groups, progress)
+    seconds = _promised(run, bands)
+    plain, problem, x = _foresee(rig, run, groups, progress, seconds)
     if bands is not None:
         plain = banded(plain, bands, rig, run, groups, problem.values_at(x))
     missed = 100 - min(plain.fit_percent.values(), default=100.0)
@@ -176,7 +200,8 @@ def _predict(
     for name in FACTORS:
         if name in (*run.unknown, *run.shared) or (name == "gain" and not run.u.any()):
             continue
-        with_it, problem, x = _foresee(rig, replace(run, unknown=(*run.unknown, name)), groups, progress)
+        wider = replace(run, unknown=(*run.unknown, name))
+        with_it, problem, x = _foresee(rig, wider, groups, progress, seconds)
         left = 100 - min(with_it.fit_percent.values())
         if left <= MENDED * missed:
             best = assess(problem, x)
@@ -188,25 +213,28 @@ def _predict(
 
 
 def _foresee(
-    rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress
+    rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]], progress: Progress, seconds: float | None
 ) -> tuple[RunScore, Problem, Array]:
-    """Score of one run, and the problem and the coordinates of what was estimated from the run itself."""
+    """Score of one run, and the problem and the coordinates of what was estimated from the run itself.
+
+    One that a filter predicts is scored so many `seconds` ahead, if that is given.
+    """
     before = replace(run, score_from=0.0)
     upto = run.score_from if run.score_from > 0 else math.inf
     if run.score_from > 2 * run.period and (run.horizon is not None or run.t.size >= LEAST_RUN):
         before, upto = before.first_part(run.score_from / (run.period * run.t.size)), math.inf
-    problem = formulate(rig, [before], given=groups)
+    problem = formulate(rig, [before], stated=groups)
     x, log = problem.start, SearchLog(progress=progress)
     if x.size:
-        found = descend_progressively(problem, x, log, upto=upto)
+        end = descend_progressively(problem, x, log, upto=upto)
         for other in _either_side(problem):
-            found = better(found, descend_progressively(problem, other, log, upto=upto))
-        if found.interrupted:
+            end = better(end, descend_progressively(problem, other, log, upto=upto))
+        if end.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh
-            found = settle_weights(problem, found)
-        x = found.x
-    whole = formulate(rig, [run], thin=False, given=groups)
+            end = settle_weights(problem, end)
+        x = end.x
+    whole = formulate(rig, [run], thin=False, stated=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]
     adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
-    return replace(score_run(whole, 0, x), adapted=tuple(adapted)), problem, x
+    return replace(score_run(whole, 0, x, seconds), adapted=tuple(adapted)), problem, x

@@ -137,7 +137,9 @@ class RunScore:
     `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
     `offer` is a factor of the run's own that would mend a prediction which falls short.
     `ahead` is the fit percent by horizon [s] and signal of samples predicted exactly so far ahead, from a filter that
-    knows the past alone; empty for other runs. Then `horizon`, `fit_percent` and the signals are the shortest's.
+    knows the past alone; empty for other runs. Then `horizon` is as far as the run is judged, `fit_percent` and the
+    signals are those of that horizon, and `ceiling` is what the start state allows of each, a percent alike: the
+    sensors tell it no better, and what it misses grows as the plant falls.
     `band` is how far (N,) from a prediction 90 % of the samples should lie, by signal; empty for a run that was fitted,
     and where the fit does not say. `beyond` says in sentences how far the run goes beyond what was fitted.
     """
@@ -155,6 +157,7 @@ class RunScore:
     adapted: tuple[str, ...] = ()
     offer: Offer | None = None
     ahead: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
+    ceiling: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
     band: Mapping[str, Array] = field(default_factory=dict[str, Array])
     beyond: tuple[str, ...] = ()
 
@@ -209,9 +212,9 @@ class Fit:
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""
-        found = {n: e.value for n, e in self.estimates.items()}
-        found |= {f"{label}: {n}": e.value for label, own in self.per_run.items() for n, e in own.items()}
-        return found | {f"group {g}: {n}": e.value for g, own in self.groups.items() for n, e in own.items()}
+        values = {n: e.value for n, e in self.estimates.items()}
+        values |= {f"{label}: {n}": e.value for label, own in self.per_run.items() for n, e in own.items()}
+        return values | {f"group {g}: {n}": e.value for g, own in self.groups.items() for n, e in own.items()}
 
 
 def to_lmfit(fit: Fit) -> Any:

@@ -88,7 +88,7 @@ def fit_figure(
 
 
 def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, buckets: int) -> None:
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
+    from matplotlib.ticker import FixedLocator, FuncFormatter
 
     t, y, model = score.t, score.y[:, j], score.simulated[:, j]
     left = y - model
@@ -103,13 +103,21 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
     lower.axhline(0, color=GREY, linewidth=0.6)
     lower.plot(*decimated(t, left, buckets), color=VERMILLION, linewidth=0.7)
     lower.set_ylabel("residual", fontsize=8)
-    lower.yaxis.set_major_locator(MaxNLocator(nbins=3, symmetric=True, steps=[1, 2, 5, 10]))  # one figure says each
-    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(float(f"{value:.3g}"), 1)))
     if score.score_from > 0:
         for panel, label in ((upper, "not scored"), (lower, None)):
             panel.axvspan(t[0], t[0] + score.score_from, color=GREY, alpha=0.25, linewidth=0, label=label)
-    for panel, values in ((upper, np.concatenate([y, model])), (lower, left)):
+    for panel, values in ((upper, np.concatenate([y, model])), (lower, np.append(left, 0.0))):
         _limits(panel, values)
+    lower.yaxis.set_major_locator(FixedLocator(_two_ticks(*lower.get_ylim())))
+    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: number(float(f"{value:.3g}"), 1)))
+
+
+def _two_ticks(low: float, high: float) -> list[float]:
+    """The largest 1, 2 or 5 times a power of ten in sight of a flat panel about zero, on each side where it is."""
+    most = max(-low, high)
+    power = 10.0 ** math.floor(math.log10(most))
+    tick = power * max(m for m in (1, 2, 5) if m * power <= most)
+    return [at for at in (-tick, tick) if low <= at <= high]
 
 
 def _envelope(t: Array, low: Array, high: Array, buckets: int) -> tuple[Array, Array, Array]:

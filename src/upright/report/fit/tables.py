@@ -127,28 +127,35 @@ def interval(e: Estimate) -> str:
 
 
 def score_table(runs: Mapping[str, RunScore]) -> Table:
-    """Fit percent of every signal of every run, fitted runs first."""
+    """Fit percent of every signal of every run, fitted runs first; free runs and predictions ahead in columns apart."""
     windowed = any(score.naive for score in runs.values())
     boxed = any(score.black_box for score in runs.values())
     banded = any(score.band for score in runs.values())
+    limited = any(score.ceiling for score in runs.values())
+    apart = len({score.horizon is None for score in runs.values()}) == 2
     rows: list[tuple[str, ...]] = []
     for label, score in sorted(runs.items(), key=lambda item: item[1].role != "fit"):
         role = "fitted" if score.role == "fit" else "predicted"
-        further = [(f"{horizon:g} s ahead", percents) for horizon, percents in list(score.ahead.items())[1:]]
-        for how, percents in ((_compared(score), score.fit_percent), *further):
+        others = {h: percents for h, percents in score.ahead.items() if h != score.horizon}
+        further = [(h, f"{h:g} s ahead", percents) for h, percents in others.items()]
+        for horizon, how, percents in ((score.horizon, _compared(score), score.fit_percent), *further):
             for name, value in percents.items():
-                first = percents is score.fit_percent  # of several horizons the shortest alone is compared
+                first = percents is score.fit_percent  # of several horizons that which is judged alone is compared
                 columns = [of for of, some in ((score.naive, windowed), (score.black_box, boxed)) if some]
                 columns += [score.inside] if banded else []
                 beside = [percent(of[name]) if first and name in of else "" for of in columns]
-                rows.append((label, role, plain(name), percent(value), *beside, how))
+                allowed = score.ceiling.get(horizon or 0.0, {})
+                beside += [percent(allowed[name]) if name in allowed else ""] if limited else []
+                fits = (percent(value),) if not apart else (percent(value), "")[:: 1 if horizon is None else -1]
+                rows.append((label, role, plain(name), *fits, *beside, how))
+    fit = ("fit, free run", "fit, ahead") if apart else ("fit",)
     return Table(
         caption="Fit percent, 100 (1 − |y − ŷ| / |y − mean y|), of every signal",
         headings=(
-            "run", "role", "signal", "fit", *(("held speed",) if windowed else ()), *(("black box",) if boxed else ()),
-            *(("in 90 % band",) if banded else ()), "simulated",
+            "run", "role", "signal", *fit, *(("held speed",) if windowed else ()), *(("black box",) if boxed else ()),
+            *(("in 90 % band",) if banded else ()), *(("start state allows",) if limited else ()), "simulated",
         ),
-        rows=tuple(rows), numbers=tuple(range(3, 4 + windowed + boxed + banded)),
+        rows=tuple(rows), numbers=tuple(range(3, 3 + len(fit) + windowed + boxed + banded + limited)),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
 from upright.laws.linear import Law, Structure
@@ -23,6 +23,9 @@ from upright.simulation.lowering.gpu import threads
 from upright.simulation.lowering.module import Module, Platform
 from upright.simulation.lowering.operands import FLOAT, INT, ArrayOf, Type, Unsupported
 
+if TYPE_CHECKING:
+    from upright.simulation.lowering.webassembly import Wasm
+
 WIDTH = 16
 """Lanes of a block: two AVX-512 or four AVX2 registers of each number hide the latency of the arithmetic."""
 
@@ -30,7 +33,7 @@ _NUMBERS, _TABLE, _MOTION, _PLACES = ArrayOf(1), ArrayOf(2), ArrayOf(3), ArrayOf
 
 RUN: tuple[Type, ...] = (
     INT, INT, INT, _TABLE, _TABLE, _TABLE, _TABLE, _PLACES, _TABLE, _TABLE,
-    INT, INT, INT, FLOAT, _NUMBERS, INT, _MOTION, _TABLE, _NUMBERS, INT,
+    INT, INT, INT, INT, INT, FLOAT, _NUMBERS, INT, _MOTION, _TABLE, _NUMBERS, INT,
 )  # fmt: skip
 """Types of `lanes.RUN_ARGUMENTS`."""
 
@@ -65,8 +68,8 @@ def _version() -> str:
 class Kernel:
     """Functions of one kernel's text, each compiled when it is first asked for."""
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, text: str, *, strict: bool = False) -> None:
+        self.text, self._strict = text, strict
         self.compiled: list[str] = []
         """Names of the functions that were not found in the cache."""
 
@@ -85,6 +88,23 @@ class Kernel:
         """Address of the search of events."""
         return self._address("events")
 
+    def wasm(self, name: str) -> Wasm:
+        """Module of WebAssembly of ``run_1`` or ``run_16``, to be called with `lanes.RUN_ARGUMENTS` plainly."""
+        from upright.simulation.lowering import webassembly
+
+        def packed() -> bytes:
+            made = webassembly.compiled(
+                self.text,
+                name,
+                dict(zip(RUN_ARGUMENTS.split(", "), RUN, strict=True)),
+                lanes=1 if name == "run_1" else webassembly.LANES,
+                strict=self._strict,
+            )
+            return " ".join(made.imports).encode() + b"\n" + made.code
+
+        imports, _, code = self._code(f"wasm {name}", packed).partition(b"\n")
+        return webassembly.Wasm(code=code, imports=tuple(imports.decode().split()))
+
     def ptx(self, room: int) -> bytes:
         """Code that steps one motion in each thread of a GPU, with so much `lanes.room`."""
         from upright.simulation.lowering import machine
@@ -94,14 +114,15 @@ class Kernel:
     def _address(self, name: str) -> int:
         from upright.simulation.lowering import machine
 
-        return machine.address_of(self._code(name, lambda: machine.compiled(lowered(self.text, name))), name)
+        code = self._code(name, lambda: machine.compiled(lowered(self.text, name, strict=self._strict)))
+        return machine.address_of(code, name)
 
     def _code(self, name: str, compiled: Callable[[], bytes]) -> bytes:
         def noted() -> bytes:
             self.compiled.append(name)
             return compiled()
 
-        return kept.code(kept.key(_version(), name, self.text), noted)
+        return kept.code(kept.key(_version(), name, "strict" * self._strict, self.text), noted)
 
 
 def _steps(address: int) -> Callable[..., None]:
@@ -116,11 +137,11 @@ def _steps(address: int) -> Callable[..., None]:
     return run
 
 
-def lowered(text: str, name: str) -> str:
+def lowered(text: str, name: str, *, strict: bool = False) -> str:
     """LLVM's text of one function of a kernel, for this processor."""
     from upright.simulation.lowering import machine
 
-    module = Module(text, 1 if name == "run_1" else machine.lanes())
+    module = Module(text, 1 if name == "run_1" else machine.lanes(), strict=strict)
     if name == "events":
         return module.pointed(name, EVENTS, machine.platform())
     return module.entry(name, RUN, machine.platform())
@@ -147,4 +168,4 @@ def compiling(loop: Law | Rule | None) -> Generator[None]:
 @cache
 def kernel(p: Layout) -> Kernel:
     """Compiled kernel of a plant in a flavour."""
-    return Kernel(source(p))
+    return Kernel(source(p), strict=p.flavour.strict)

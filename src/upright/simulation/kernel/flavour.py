@@ -63,6 +63,9 @@ class Flavour:
     carried : bool
         What joints and braking remember goes in and comes out behind the states, so that a motion can be taken up where
         another ended.
+    strict : bool
+        Every operation is rounded by itself, in the order of the text: the same numbers, to the last bit, on every
+        processor and in a page; a third slower.
     """
 
     dry: tuple[int, ...] = ()
@@ -81,6 +84,7 @@ class Flavour:
     loop: Structure | Written | None = None
     record: bool = True
     carried: bool = False
+    strict: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,6 +252,7 @@ def choose(
     held: Collection[str] = (),
     loop: Law | Rule | None = None,
     record: bool = True,
+    strict: bool = False,
 ) -> Flavour:
     """Smallest flavour that computes what `params` ask for.
 
@@ -265,6 +270,8 @@ def choose(
         Controller that computes the input.
     record : bool
         The motion is returned.
+    strict : bool
+        Same numbers on every processor, see `Flavour`.
 
     Raises
     ------
@@ -312,6 +319,7 @@ def choose(
         droop=on("actuator.droop"),
         loop=None if loop is None else loop.compiled_in,
         record=record,
+        strict=strict,
     )
 
 

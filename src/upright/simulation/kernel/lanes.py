@@ -298,9 +298,15 @@ def law_text(p: Layout) -> str:
 
 
 RUN_ARGUMENTS = (
-    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _nsteps, _every, _substeps, _dt, FL, _nbuf, OUT, STAT, "
-    "W, _events"
+    "_b0, _b1, _total, P, X0, U, R, START, HELD, HBASE, _first, _end, _nsteps, _every, _substeps, _dt, FL, "
+    "_nbuf, OUT, STAT, W, _events"
 )
+"""What ``run_L`` takes.
+
+A motion in one call has `_first` 0 and `_end` after `_nsteps`, the sample that nothing follows. One block's motion in
+several calls has an `_end` where the next `_first` goes on from ``W`` as it was left, and no `_nsteps` that it reaches.
+Rows of ``OUT`` are counted from `_first`.
+"""
 
 
 def room(p: Layout, width: int, buffer: int) -> int:
@@ -319,16 +325,16 @@ def run_text(p: Layout, width: int) -> str:
         "for _b in range(_b0, _b1):",
     )
     w.depth = 2
-    w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "W[:] = 0.0")
+    w.add(f"_base = _b * {width}", f"_valid = min({width}, _total - _base)", "if _first == 0:")
+    w.depth = 3
+    w.add("W[:] = 0.0")
     w.lanes()
     start(w)
     w.depth = 2
-    w.add("for _k in range(_nsteps + 1):")
-    w.depth = 3
-    prescribed(w)
-    (controller if p.flavour.loop else open_loop)(w)
-    w.depth = 3
-    (_record if p.flavour.record else _reduce)(w)
+    w.add("for _k in range(_first, _end):")
+    for part in (prescribed, controller if p.flavour.loop else open_loop, _record if p.flavour.record else _reduce):
+        w.depth = 3
+        part(w)
     w.depth = 3
     w.add("if _k == _nsteps:", "    break", "for _j in range(_substeps):")
     w.depth = 4
@@ -349,9 +355,9 @@ def _statistics(p: Layout) -> list[str]:
 
 def _record(w: Writer) -> None:
     p = w.p
-    w.add("if _k % _every == 0:")
+    w.add("if (_k - _first) % _every == 0:")
     w.depth += 1
-    w.add("_row = _k // _every")
+    w.add("_row = (_k - _first) // _every")
     columns = [f"{c}{i}" for i in range(p.n) for c in "qv"]
     columns += [f"ua{j}" for j in range(p.nu)] if p.flavour.loop else []
     for c, name in enumerate(columns):

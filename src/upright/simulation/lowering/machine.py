@@ -126,6 +126,36 @@ def ptx(text: str) -> bytes:
     return _gpu().emit_assembly(_optimized(text, _gpu())).encode()
 
 
+_PAGE = "wasm32-unknown-unknown"
+_PAGE_FEATURES = "+simd128,+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals,+multivalue"
+"""What every browser of today has; fused multiply-adds and wider vectors are not among it."""
+
+
+@cache
+def _page() -> Any:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    triple = llvm.Target.from_triple(_PAGE)
+    return triple.create_target_machine(cpu="generic", features=_PAGE_FEATURES, opt=_CODE, reloc="static")
+
+
+@cache
+def page() -> Platform:
+    """What modules are written for that run in a page."""
+    return Platform(triple=_PAGE, layout=str(_page().target_data), head=0)
+
+
+def wasm(text: str) -> bytes:
+    """Object of WebAssembly of a module.
+
+    Parameters
+    ----------
+    text : str
+        LLVM's text, written for `page`.
+    """
+    return translated(text, _page())
+
+
 @cache
 def _linker() -> Any:
     return llvm.create_lljit_compiler(_target(), use_jit_link=True)

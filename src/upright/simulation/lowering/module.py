@@ -62,10 +62,13 @@ class Platform:
 
 
 class Module:
-    """Functions of one text, written for so many lanes in a vector; `together` when none of them is `separate`."""
+    """Functions of one text, written for so many lanes in a vector; `together` when none of them is `separate`.
 
-    def __init__(self, text: str, lanes: int, *, together: bool = False) -> None:
-        self._functions, self._lanes, self._together = functions(text), lanes, together
+    With `strict` every operation is rounded by itself, in the order of the text: the same numbers on every processor.
+    """
+
+    def __init__(self, text: str, lanes: int, *, together: bool = False, strict: bool = False) -> None:
+        self._functions, self._lanes, self._together, self._strict = functions(text), lanes, together, strict
         self._written: list[str] = []
         self.declared: dict[str, str] = {}
         """What of LLVM and of the C library is called, by name."""
@@ -84,6 +87,7 @@ class Module:
         key = name, types
         if key not in self._instances:
             flags, attribute = _MARKS[mark(self._functions[name])]
+            flags = "" if self._strict else flags
             if self._together and mark(self._functions[name]) == "separate":
                 attribute = "noinline"  # few lanes need it, at a time
             symbol = f"{name}.{len(self._instances)}"

@@ -1,0 +1,12 @@
+/* What puts the command out: a converter into an amplifier, or an H-bridge in one of two ways of wiring it. */
+#ifndef DRIVE_H
+#define DRIVE_H
+#define DRIVE_ANALOG 1 /* +-10 V of an AD5761R */
+#define DRIVE_PAIR 2   /* two PWM inputs, one for each way: BTS7960, DRV8871 */
+#define DRIVE_SIGN 3   /* one PWM input and the way on two lines: VNH5019, L298N; on one: Cytron, Pololu */
+#ifndef DRIVE
+#define DRIVE DRIVE_ANALOG
+#endif
+
+void drive_prepare(void); /* at zero, before anything else */
+#endif

@@ -1,0 +1,151 @@
+"""Do verdict, tables and next steps of experiment 2b say what its log shows?"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from tests.experiments.swing_up_2b.closed_form import BAD, GOOD, LAW, RIG, climbed, experiment
+from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
+from upright.experiments.swing_up_2b.run import LIES, Lie
+
+UP = "with at most 8 of 10 V and 0.6 of 1.5 rad of travel"
+
+
+def lie(**what):
+    rest = {
+        "name": "theta", "factor": -0.5, "estimate": 0.49987, "error": 0.001, "refused": True, "spoke": 0.0123,
+        "tilt": math.radians(7.5), "suspicion": "theta", "fell": 0.2345,
+    }  # fmt: skip
+    return Lie(**(rest | what))
+
+
+@pytest.mark.parametrize(
+    ("ascent", "caught", "verdict"),
+    [
+        (climbed(), True, f"From hanging to upright in 2.00 s and 5 half swings, {UP}; it stood to the end, 6 s."),
+        (
+            climbed(falls=[(2.5, 3.0)]), True,
+            f"From hanging to upright in 3.00 s and 5 half swings at the 2. catch, {UP}; it stood to the end, 5 s.",
+        ),
+        (climbed(caught=3.01), False, f"The pendulum did not stand for 5 s: it fell 0 times, {UP}."),
+        (climbed(falls=[(2.5, 3.0), (3.5, 3.8)]), False, f"The pendulum did not stand for 5 s: it fell 2 times, {UP}."),
+        (climbed(caught=99), False, f"The pendulum was not caught in 8 s, {UP}; allow more time or travel."),
+        (
+            climbed(tripped=7.895), False,  # it still stands, but nothing holds it any more
+            "The end of the travel switched the drive off after 7.90 s; allow more or pump less.",
+        ),
+    ],
+)  # fmt: skip
+def test_the_verdict_says_how_far_it_came(ascent, caught, verdict):
+    done = experiment(ascent)
+    assert (done.caught, done.verdict) == (caught, verdict)
+    told = chapter(done)
+    assert (told.verdict, told.sound) == (verdict, caught)
+    assert told.numbers["swing_up"]["held"] == caught
+
+
+def test_no_loop_is_closed_on_an_encoder_that_is_wrong():
+    done = experiment(check=BAD)
+    assert done.verdict.startswith("No loop was closed. The encoder of theta shows 2")
+    told = chapter(done)
+    assert [part.title for part in told.parts] == ["Encoders, before a loop is closed"]
+    assert [(k.what, k.value) for k in told.findings] == [("swing-up", "no")]
+    assert told.numbers["swing_up"] is None
+    assert told.numbers["sensors"]["theta"]["sound"] is False
+    assert [step.sentence for step in told.steps] == ["Mend the encoder, then try again."]
+
+
+def test_the_table_of_encoders_has_scale_interval_and_what_is_explained():
+    told = check_chapter(RIG, BAD, "own.csv")
+    (table,) = [b for b in told.parts[0].content if hasattr(b, "rows")]
+    assert table.rows == (
+        ("psi", "1.0010", "4.0·10⁻³", "99.90 %", "sound"), ("theta", "2.0000", "2.0·10⁻³", "98.0 %", "to be mended"),
+    )  # fmt: skip
+    assert table.numbers == (1, 2, 3)
+    assert told.steps[0].command == ""
+    assert told.numbers["sensors"]["psi"] == {"scale": 1.001, "stderr": 0.002, "explained": 0.999, "sound": True}
+
+
+def test_encoders_that_are_right_lead_on_to_the_gains():
+    told = check_chapter(RIG, GOOD, "own.csv", "mine.json")
+    assert told.sound
+    assert told.steps[0].command == "upright regulate mine.json"
+
+
+def test_the_way_up_is_a_table_of_what_the_log_shows():
+    """8 V of 10: never at the limit; the catch's ellipsoid is three quarters of what the linear model allows."""
+    told = chapter(experiment(climbed(falls=[(2.5, 3.0)], volts=8.0)))
+    (table,) = [b for b in told.parts[1].content if hasattr(b, "rows")]
+    assert table.rows == (
+        ("upright for good after", "3.00", "s"),
+        ("half swings before the first handover", "5", ""),
+        ("handovers, falls", "2, 1", ""),
+        ("largest command, of its limit", "8 of 10", "V"),
+        ("share of the time at the limit", "0.0 %", ""),
+        ("farthest from the middle, of the travel", "0.6 of 1.5", "rad"),
+        ("ellipsoid of the catch, of what the linear model allows", "75.0 %", ""),
+    )
+    (never,) = [b for b in chapter(experiment(climbed(caught=99))).parts[1].content if hasattr(b, "rows")]
+    assert never.rows[0] == ("upright for good after", "never", "s")
+
+
+def test_lies_are_counted_by_who_notices_them_and_when():
+    """Of four lies three are found hanging; two fall, and a watch speaks before one of them."""
+    lies = (
+        lie(), lie(factor=4.0, spoke=0.5, fell=0.3),
+        lie(refused=False, spoke=math.inf, tilt=0.0, suspicion="", fell=math.inf),
+        lie(fell=math.inf),
+    )  # fmt: skip
+    told = chapter(experiment(climbed(), lies=lies))
+    points, table = told.parts[2].content
+    assert points.sentences == (
+        "Hanging, 3 of 4 lies are found before a loop is closed. A loop started 3 degrees from upright falls with 2 "
+        "of them; a watch beside it switches off before the fall in 1 cases.",
+    )
+    assert table.rows[0] == ("theta", "−0.5", "0.4999", "12", "7.5", "theta", "234")
+    assert table.rows[1] == ("theta", "4", "0.4999", "500", "7.5", "theta", "300")
+    assert table.rows[2] == ("theta", "−0.5", "0.4999", "–", "–", "–", "stands")
+    assert table.numbers == (1, 2, 3, 4, 6)
+    assert told.numbers["lies_tried"] == len(LIES)
+    assert told.numbers["lies"][0]["fell"] == 0.2345
+    assert chapter(experiment(climbed())).numbers["lies_tried"] == 0
+
+
+def test_the_next_step_follows_from_what_came_of_it():
+    own = chapter(experiment(climbed(), source="fit.json"))
+    assert [s.command for s in own.steps] == ['upright swing-up fit.json --seed 3 --lie "theta=2"']
+    sheet = [s.command for s in chapter(experiment(climbed())).steps]
+    assert sheet == [
+        'upright swing-up --rig furuta --seed 3 --lie "theta=2"', "upright swing-up FIT.json --seed 3",
+    ]  # fmt: skip
+    lost = [s.command for s in chapter(experiment(climbed(caught=99), source="fit.json")).steps]
+    assert lost[1] == "upright swing-up fit.json --seed 3 --travel 3"  # twice as far
+    broken = [s.command for s in chapter(experiment(check=BAD, source="fit.json")).steps]
+    assert broken == ["upright swing-up fit.json --seed 3"]
+
+
+def test_the_cover_has_time_and_command_of_a_pendulum_that_was_caught():
+    told = chapter(experiment(climbed(falls=[(2.5, 3.0)])))
+    assert [(k.what, k.value) for k in told.findings] == [
+        ("from hanging to upright", "3.00 s"), ("largest command of the swing-up", "8.00 V"),
+    ]  # fmt: skip
+    assert [k.value for k in chapter(experiment(climbed(caught=99))).findings] == ["no"]
+    up = told.numbers["swing_up"]
+    assert (up["upright_after"], up["half_swings"]) == (pytest.approx(3.0), 5)
+    assert up["handovers"] == pytest.approx((2.0, 3.0))
+    assert up["falls"] == pytest.approx((2.5,))
+    assert (up["peak_command"], up["share_saturated"]) == (pytest.approx(8.0), 0.0)
+    assert up["travel"] == pytest.approx(0.6, abs=1e-4)
+    assert told.numbers["law"] | {"K": 0, "P": 0} == {
+        "K": 0, "P": 0, "size": LAW.size, "sure": LAW.sure, "reach": LAW.reach, "limit": 10.0, "travel": 1.5,
+        "held_for": 5.0, "body": vars(LAW.body),
+    }  # fmt: skip
+
+
+def test_a_rig_with_numbers_of_its_own_is_called_by_its_seed():
+    assert chapter(experiment(climbed())).title.endswith(", seed 3")
+    assert "seed" not in chapter(experiment(climbed(), truth=RIG)).title
+    assert "numbers identified hanging" in chapter(experiment(climbed(), source="fit.json")).detail
+    assert "as designed" in chapter(experiment(climbed())).detail

@@ -1,0 +1,51 @@
+"""Is what a picture says to be read: nothing cut off at its edge, no axis label on the numbers of its axis?"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from matplotlib.axis import Tick
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+
+PIXEL = 1.0
+
+
+def unreadable(drawing) -> list[str]:
+    """Texts that the edge cuts off, and those outside of the frames that lie on one another."""
+    FigureCanvasAgg(drawing).draw()
+    width, height = drawing.bbox.width, drawing.bbox.height
+    texts = [text for text in drawing.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    of_ticks = {label for tick in drawing.findobj(Tick) for label in (tick.label1, tick.label2)}
+    hidden = {text for ax in drawing.axes if not ax.get_visible() for text in ax.findobj(Text)}
+    drawn = {label for ax in drawing.axes for label in _tick_labels(ax)} - hidden
+    boxes = {text: text.get_window_extent() for text in texts if text in drawn or text not in of_ticks | hidden}
+    cut = [
+        f"cut off: {text.get_text()}"
+        for text, box in boxes.items()
+        if box.x0 < -PIXEL or box.y0 < -PIXEL or box.x1 > width + PIXEL or box.y1 > height + PIXEL
+    ]
+    outside = [text for text in boxes if text.axes is None or text not in text.axes.texts]
+    labels = [(label, ax) for ax in drawing.axes for label in (ax.xaxis.label, ax.yaxis.label) if label in boxes]
+    within = [
+        f"in the frame: {label.get_text()}" for label, ax in labels if boxes[label].padded(-PIXEL).overlaps(ax.bbox)
+    ]
+    return (
+        cut
+        + within
+        + [
+            f"{one.get_text()} on {other.get_text()}"
+            for one, other in combinations(outside, 2)
+            if boxes[one].padded(-PIXEL).overlaps(boxes[other].padded(-PIXEL))
+        ]
+    )
+
+
+def _tick_labels(ax) -> list[Text]:
+    """Labels on the part of each axis that is drawn."""
+    return [
+        label
+        for i, (axis, ends) in enumerate(((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())))
+        for label in axis.get_ticklabels(which="both")
+        if min(ends) <= label.get_position()[i] <= max(ends)
+    ]
