@@ -47,7 +47,7 @@ class Tie:
         value, low, high = (f"{v:.{digits}g}" for v in (e.value, *e.interval))
         sign, unit = "+" if self.factor > 0 else "-", "" if e.unit in ("", "1") else f" {e.unit}"
         return (
-            f"{self.first} and {self.second} cannot be told apart (correlation {self.correlation:.3g}); known is "
+            f"{self.first} and {self.second} cannot be told apart (correlation {self.correlation:.4g}); known is "
             f"{self.first} {sign} {abs(self.factor):.3g} {self.second} = {value} ({low} to {high}){unit}, in SI units."
         )
 
@@ -67,7 +67,7 @@ def ties(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Tie, ...]:
     pinned = best.pinned[places]
     moving = np.outer(~pinned, ~pinned)
     C = best.covariance[np.ix_(places, places)] * np.outer(slope, slope)
-    others = [i for i in np.flatnonzero(~best.pinned) if i not in places]
+    others = [int(i) for i in np.flatnonzero(~best.pinned) if i not in places]
     every = [*places, *others]
     off = pseudo_inverse(best.matrix[np.ix_(every, every)])[: len(places), : len(places)] * np.outer(slope, slope)
     R = np.where(moving, _correlation(C), np.where(np.outer(pinned, pinned), 0.0, _correlation(off)))
