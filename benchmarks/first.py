@@ -13,11 +13,14 @@ from __future__ import annotations
 
 import math
 import os
+import signal
 import tempfile
+import threading
 import time
 import tomllib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +34,7 @@ DT, REST, MOVED = 5e-3, 1.0, 8.0
 GAIN = {"furuta": 0.05, "cart-pendulum": 1.7, "torsional-2": 0.1, "rectilinear-2": 6.0}
 """Force per volt."""
 SECONDS, KEPT, OFF = 10.0, 0.9, 0.2
+ENDS = ("trusted", "not trusted", "refused", "out of time", "error")
 DIALECTS = ("brackets", "milliseconds", "tabs")
 NO_LOGS = ("README", "EstimatedParameters", "parameters.yaml", "controller.toml", "README_system_id")
 
@@ -53,8 +57,12 @@ class Contact:
     log: str
     dialect: str
     ended: str
-    """"trusted", "not trusted", "refused", or "error": a bare exception."""
+    """Of `ENDS`; an error is a bare exception."""
     said: str
+    refusal: str = ""
+    """What `design` said where it is the step that did not come through."""
+    taken: dict[str, float] = field(default_factory=dict[str, float])
+    """CPU seconds by step."""
     usable: dict[str, float] = field(default_factory=dict[str, float])
     values: dict[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     """Estimate and half its interval by name."""
@@ -166,6 +174,29 @@ def moving(source: Source) -> tuple[float, float]:
     return (float(t[where[0]]), float(t[where[-1]])) if where.size else (0.0, float(t[-1]))
 
 
+class OutOfTime(BaseException):
+    """A step has taken all of its CPU time; no `except Exception` and no Ctrl-C of a search may take it for its own."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """End what takes more CPU seconds, where there is a clock for it: not on Windows, nor beside the main thread."""
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: Any) -> None:
+        raise OutOfTime
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
 def met(source: Source, dialect: str) -> Contact:
     """One log in one dialect, as a stranger would take it through."""
     import upright as up
@@ -173,41 +204,53 @@ def met(source: Source, dialect: str) -> Contact:
 
     with tempfile.TemporaryDirectory() as folder:
         log = written(source, dialect, Path(folder))
-        began = time.perf_counter()
-        at: dict[str, Any] = {"log": source.name, "dialect": dialect}
         study = Path(folder) / "study.toml"
-        step = "show"
-        try:
-            up.show(log)
-            step = "init"
-            up.init(log, out=study)
-            step = "identify"
-            fit = up.identify(study)
-            step = "design"
-            held, design = _designed(source, fit)
-        except UprightError as error:
-            return Contact(**at, ended="refused", said=f"{step}: {error}", seconds=time.perf_counter() - began)
-        except Exception as error:  # what a stranger must never meet
-            return Contact(
-                **at, ended="error", said=f"{step}: {type(error).__name__}: {error}",
-                seconds=time.perf_counter() - began,
-            )  # fmt: skip
-        seconds = time.perf_counter() - began
-        drafted = tomllib.loads(study.read_text(encoding="utf-8"))
+        steps: dict[str, Callable[[dict[str, Any]], Any]] = {
+            "show": lambda _: up.show(log),
+            "init": lambda _: up.init(log, out=study),
+            "identify": lambda _: up.identify(study),
+            "design": lambda done: _designed(source, done["identify"]),
+        }
+        done: dict[str, Any] = {}
+        taken: dict[str, float] = {}
+        ended = said = ""
+        for step, work in steps.items():
+            began = time.process_time()
+            try:
+                with limited(SECONDS):
+                    done[step] = work(done)
+            except OutOfTime:
+                ended, said = "out of time", f"{step}: more than {SECONDS:g} s"
+            except UprightError as error:
+                ended, said = "refused", f"{step}: {error}"
+            except Exception as error:  # what a stranger must never meet
+                ended, said = "error", f"{step}: {type(error).__name__}: {error}"
+            taken[step] = time.process_time() - began
+            if ended:
+                break
+        drafted = tomllib.loads(study.read_text(encoding="utf-8")) if "init" in done else None
+    contact = Contact(
+        log=source.name, dialect=dialect, ended=ended, said=said, seconds=sum(taken.values()), taken=taken,
+        plant=drafted["rig"]["plant"] if drafted else "",
+    )  # fmt: skip
+    if drafted is None or "identify" not in done:
+        return contact
+    fit = done["identify"]
+    held, design = done.get("design", (None, said))
     assumed = {n for n, v in drafted["parameters"].items() if isinstance(v, dict) and v.get("assumed")}
     usable = {
         n: e.value for n, e in fit.estimates.items() if fit.trusted and e.status == "well determined" and not e.rests_on
     }
-    truth = _meant(source.truth, assumed) if source.plant == drafted["rig"]["plant"] else {}
+    truth = _meant(source.truth, assumed) if source.plant == contact.plant else {}
     wrong = tuple(n for n, value in usable.items() if _misses(fit.estimates[n], value, truth.get(n)))
     first, last = moving(source)
     windows = [r.get("window", (0.0, math.inf)) for r in drafted["runs"]]
     covered = sum(max(0.0, min(b, last) - max(a, first)) for a, b in windows) / max(last - first, 1e-9)
-    return Contact(
-        **at, ended="trusted" if fit.trusted else "not trusted", said=f"{fit.verdict} {design}", usable=usable,
-        values={n: (e.value, (e.interval[1] - e.interval[0]) / 2) for n, e in fit.estimates.items()}, wrong=wrong,
-        placeholders=tuple(sorted(assumed & set(usable))), plant=drafted["rig"]["plant"], kept=min(covered, 1.0),
-        seconds=seconds, held=held,
+    return replace(
+        contact, ended=ended or ("trusted" if fit.trusted else "not trusted"), said=f"{fit.verdict} {design}",
+        refusal=said, usable=usable, wrong=wrong, held=held, kept=min(covered, 1.0),
+        values={n: (e.value, (e.interval[1] - e.interval[0]) / 2) for n, e in fit.estimates.items()},
+        placeholders=tuple(sorted(assumed & set(usable))),
     )  # fmt: skip
 
 
@@ -276,7 +319,7 @@ def _line(name: str, contacts: Sequence[Contact]) -> Line:
 
 
 def _told(contacts: Sequence[Contact]) -> str:
-    ends = {e: sum(c.ended == e for c in contacts) for e in ("trusted", "not trusted", "refused", "error")}
+    ends = {e: sum(c.ended == e for c in contacts) for e in ENDS}
     parts = [f"{len(contacts)} contacts: " + ", ".join(f"{n} {e}" for e, n in ends.items() if n)]
     numbers = sum(len(c.usable) for c in contacts)
     parts.append(f"{numbers} usable numbers, {sum(len(c.wrong) for c in contacts)} of them wrong, "
@@ -331,7 +374,7 @@ def _page(contacts: dict[str, list[Contact]]) -> str:
         for c in each:
             kept = "" if c.kept is None else f"{100 * c.kept:.0f}"
             numbers = ", ".join(f"**{n}**" if n in c.wrong else n for n in c.usable)
-            if c.ended in ("refused", "error"):
-                numbers = c.said.splitlines()[0].replace("|", "/")[:160]
+            if c.ended in ("refused", "out of time", "error"):
+                numbers = (c.refusal or c.said).splitlines()[0].replace("|", "/")[:160]
             body.append(f"| {c.log} | {c.dialect} | {c.plant} | {c.ended} | {kept} | {c.seconds:.1f} | {numbers} |")
     return page("first", "First contact", __doc__, body)

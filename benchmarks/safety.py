@@ -169,6 +169,13 @@ COUNTERS = (
            tell=in_loop(lambda s: None, first=board.runs_over)),
     Hazard(what="a transition that no encoder makes", by=F.ENCODER, within=0.0, tell=in_loop(board.says("illegal"))),
 )  # fmt: skip
+STARTED_ANEW = (
+    Hazard(what="board starts anew (a dip of its supply)", by=F.RESET, within=0.0, tell=in_loop(board.starts_anew)),
+    Hazard(what="board starts anew, and hears all of the run again", by=F.RESET, within=0.0,
+           tell=in_loop(board.hears_it_all_again(reset=True), after=0.3)),
+    Hazard(what="stopped, the board hears all of the run again", by=F.RESET, within=0.0,
+           tell=in_loop(board.hears_it_all_again(reset=False), after=0.3)),
+)  # fmt: skip
 CUT = Hazard(what="link cut", by=F.WATCHDOG, within=LIMITS.watchdog, tell=in_loop(lambda s: s.on.cut()))
 CORRUPTED = tuple(
     Hazard(what=f"1 of {1 / chance:,.0f} bytes corrupted, both ways", by=F.WATCHDOG | F.STALE, stands=True,
@@ -188,6 +195,7 @@ ON_FIRMWARE = (
     *CORRUPTED,
     Hazard(what="full command that waited for 50 ms in a buffer", by=F.STALE, within=0.0,
            tell=in_loop(board.in_a_buffer)),
+    *STARTED_ANEW,
     Hazard(what="3 requests in a row do not arrive", by=F(0), stands=True, tell=in_loop(board.missed(3))),
     Hazard(what="5 requests in a row do not arrive", by=F.WATCHDOG, within=LIMITS.watchdog,
            tell=in_loop(board.missed(5))),
@@ -211,6 +219,7 @@ ON_THE_BOARD = (
 IN_SILICON = (
     SOUND[1],
     Hazard(what="processor hangs, interrupts off", by=F.RESET, within=0.015, tell=in_loop(board.hangs)),
+    *STARTED_ANEW,
     *(h for h in ENCODERS if h.what.endswith(("dead, moving", "flips, moving"))),
     *COUNTERS,
     Hazard(what="loop late by 50 ms", by=F.WATCHDOG, within=LIMITS.watchdog, tell=silent(0.05)),

@@ -277,8 +277,9 @@ def test_chance_asks_for_a_limit_in_the_unit_of_the_fit():
     known = {n: v for n, v in FURUTA.items() if n != "J_d"} | {"b_1": "0 N m s/rad"}
     fit = up.identify(log, up.Furuta, known=known, ask={"J_d": "9e-3 kg m^2"})
     gains = up.place(fit.plant.linear("inverted"), POLES)
-    with pytest.raises(up.BadInput, match=r"limit=10 .*period=\"2 ms\" .*counts"):
+    with pytest.raises(up.BadInput, match=r"limit=10 .*period=\"2 ms\" ") as asked:
         up.chance(fit, gains)
+    assert "counts" not in str(asked.value)  # five digits bound what an encoder's steps could be
     told = {
         "tilt": "3 deg",
         "push": 0.0,

@@ -51,7 +51,7 @@ report.run
 diagnosis questionnaire designing
 paper
 running
-experiments.abreast
+experiments.parallel
 experiments.stand
 experiments.weighing_1a
 experiments.frequency_1b

@@ -1,7 +1,7 @@
 """Loops in which nothing is broken: which interlocks that know a model would have stopped them all the same?
 
-Rigs of both makes, drawn and worn (more friction close to rest, ripple of the torque, a frame out of level, play and
-encoders off centre), are held upright by a law for the rig as designed, for 4 s each: at rest inside dry friction,
+Rigs of both makes, drawn and non-ideal (more friction close to rest, ripple of the torque, a frame out of level, play
+and encoders off centre), are held upright by a law for the rig as designed, for 4 s each: at rest inside dry friction,
 tapped, pushed by a finger for up to 0.2 s, and led by a reference.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.hazards.story import POLES
 from upright.control.sensors import Watch
-from upright.experiments.worn import worn
+from upright.experiments.nonideal import nonideal
 from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.records import Array
@@ -110,7 +110,7 @@ def all_of(make: str, kind: str, seeds: range) -> Left:
 def ran(known: Rig, law: Law, make: str, kind: str, seed: int) -> tuple[Array, Array, bool, bool]:
     """Deviations and commands of a run, and whether the body was said to show no count, or to lie about its motion."""
     disturbed = KINDS[kind](make, np.random.default_rng([seed, 83]), known.period)
-    port = TwinPort(worn(make_rig(make, seed), seed))
+    port = TwinPort(nonideal(make_rig(make, seed), seed))
     beside = Supervisor(Board(port), Duty(limits=FREE, model=known, at="inverted", zero="hanging", watch=False,
                                           lean=math.radians(30), near=math.radians(10)))  # fmt: skip
     beside.prepare()

@@ -31,8 +31,8 @@ from upright.control.sensors import (
 )
 from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
+from upright.experiments.nonideal import nonideal
 from upright.experiments.swing_up_2b.run import scales_of_log
-from upright.experiments.worn import worn
 from upright.physics import Furuta
 from upright.readers import read
 from upright.records import Record
@@ -51,7 +51,6 @@ def checked(rig, make):
     return scales(make_rig(make), shown_by_encoders(rig, command(make)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("make", MAKES)
 @pytest.mark.parametrize("shown", [(1.0, -1.0), (-1.0, 1.0), (1.0, 0.5), (4.0, 1.0), (1.1, 0.9)])
 def test_what_an_encoder_shows_over_what_is_true_is_found_hanging(make, shown):
@@ -218,7 +217,6 @@ def test_sound_sensors_are_seldom_suspected():
     assert math.log(ODDS) > math.log(c)
 
 
-@pytest.mark.slow
 def test_a_watched_drive_stops_pushing():
     """The same run up to the alarm, no command after it, and then no more energy than a falling pendulum has."""
     watch, law = loop("linear")
@@ -291,7 +289,7 @@ def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
     sampled = linear.to_sampled(model.period, model.delay / model.period)
     gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
     law = design.feedback(design.filtered(sampled, 0.5), gains.K)
-    truth, watch = coarse(worn(make_rig(make, seed), seed)), Watch(model)
+    truth, watch = coarse(nonideal(make_rig(make, seed), seed)), Watch(model)
     run, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
     assert alarm.sample[0] == -1
     assert np.any(run.u[-200:] != 0.0)  # the drive stays on

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+from upright.readers.inspection import inspect_record
 from upright.readers.resolution import (
     Resolution,
     counts_per_rev,
@@ -18,6 +19,7 @@ from upright.readers.resolution import (
     resolution_of,
     rounding,
 )
+from upright.records import Record
 
 
 @pytest.mark.parametrize(
@@ -71,8 +73,30 @@ def test_decimals_are_the_texts_when_values_come_again_and_again():
     t = 2e-3 * np.arange(4000)
     found = resolution_of(np.round(0.9 * np.exp(-0.3 * t) * np.cos(5 * t), 2))
     assert (found.step, found.decimals) == (0.01, True)
-    assert resolution_of(np.round(np.random.default_rng(3).normal(size=300), 6)) == Resolution()
-    assert resolution_of(np.array([0.25, 0.5] * 9)) == Resolution()  # two levels are no grid
+    assert resolution_of(np.round(np.random.default_rng(3).normal(size=300), 6)).step == 0
+    assert resolution_of(np.array([0.25, 0.5] * 9)).step == 0  # two levels are no grid
+
+
+def test_where_no_step_is_seen_its_bound_is_that_of_the_digits_or_of_the_noise():
+    """Rounding to q errs by q/sqrt(12), rms: noise of sigma hides steps up to sqrt(12) sigma. 4000 samples tell a
+    standard deviation by the median of overlapping fourth differences to some percent."""
+    t, rng = 2e-3 * np.arange(4000), np.random.default_rng(5)
+    swing = np.sin(3 * t) * np.exp(-0.1 * t)
+    fine, noisy = (resolution_of(x) for x in (np.round(swing, 5), swing + 1e-3 * rng.normal(size=t.size)))
+    assert (fine.step, noisy.step) == (0, 0)
+    assert fine.hidden == pytest.approx(1e-5)
+    assert noisy.hidden == pytest.approx(math.sqrt(12) * 1e-3, rel=0.1)
+
+
+@pytest.mark.parametrize("counts", [2000, 4096, 10_000, 16_384])
+def test_an_angles_counts_are_the_same_in_degrees_and_in_radians(counts):
+    """A unit is how an angle is written, and no other encoder."""
+    t = 5e-3 * np.arange(2000)
+    turns = np.round(counts * 0.15 * np.sin(4 * t) * np.exp(-0.1 * t)) / counts
+    signals = {"theta_rad": 2 * math.pi * turns, "theta_deg": 360 * turns}
+    written = {n: np.array([float(f"{x:.9g}") for x in v]) for n, v in signals.items()}
+    seen = inspect_record(Record(t=t, signals=written, units={"theta_rad": "rad", "theta_deg": "deg"}))
+    assert {c.name: c.resolution.counts_per_rev for c in seen.columns} == dict.fromkeys(signals, counts)
 
 
 @pytest.mark.parametrize(

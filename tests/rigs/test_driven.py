@@ -10,7 +10,7 @@ import pytest
 
 from tests.rigs.test_supervisor import DUTY, LAW, MODEL, RIG, Scene
 from upright.errors import RigStopped
-from upright.experiments.worn import worn
+from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
 from upright.rigs.driven import DrivenScale, StillDrive
@@ -67,7 +67,7 @@ def test_a_hand_that_moves_the_pendulum_of_a_resting_arm_is_not_called_a_dead_en
 @pytest.mark.parametrize("share", [0.0, -1.0])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_arm_is_stopped_well_within_its_travel(seed, share):
-    scene = Scene(truth=worn(make_rig("furuta", seed), seed)).started(tilt=0.08)
+    scene = Scene(truth=nonideal(make_rig("furuta", seed), seed)).started(tilt=0.08)
     with pytest.raises(RigStopped, match=r"psi|Psi"):
         scene.run(4.0, then=lambda p: p.encoders.scaled(0, share))
     # with nobody beside it the loop lets it go 1.5 rad (wrong way round) to 10 rad (dead)
@@ -95,8 +95,8 @@ def test_what_command_and_pendulum_both_say_stops_the_rig_in_that_tick(share, wh
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_worn_rig_that_is_pushed_is_not_stopped(seed):
-    scene = Scene(replace(DUTY, watch=False), worn(make_rig("furuta", seed), seed)).started(tilt=0.03, law=LAW)
+def test_a_nonideal_rig_that_is_pushed_is_not_stopped(seed):
+    scene = Scene(replace(DUTY, watch=False), nonideal(make_rig("furuta", seed), seed)).started(tilt=0.03, law=LAW)
     scale, still = DrivenScale(RIG, "inverted"), StillDrive(RIG, "inverted")
     tick = scene.rig.exchange(0.0)
     for k in range(2500):

@@ -15,7 +15,9 @@ LONG = ("1 of 1,000,000 bytes", "1 of 100,000 bytes")
 def brief(column, hazard):
     """Whether a row takes seconds; the others, most of them under simavr, are in `python -m benchmarks safety`."""
     simulated = column.name.startswith("ATmega")
-    return not hazard.what.startswith(LONG) and (not simulated or "hang" in hazard.what or "dead" in hazard.what)
+    return not hazard.what.startswith(LONG) and (
+        not simulated or any(word in hazard.what for word in ("hang", "dead", "anew"))
+    )
 
 
 EVERY = [

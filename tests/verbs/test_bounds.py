@@ -18,7 +18,7 @@ ASKED = {"poles": "-4, -5", "period": "2 ms"}
 
 
 def wish(model=TOWER, **options):
-    return up.design(model, **(ASKED | options)).value.wish
+    return up.design(model, **(ASKED | options)).value.request
 
 
 def test_a_design_of_matrices_takes_period_limit_and_start_as_they_are_typed():
@@ -59,8 +59,8 @@ def of_rig(**options):
 )  # fmt: skip
 def test_counts_are_per_turn_of_all_or_of_each(counts, resolution):
     done = of_rig(counts=counts)
-    assert done.value.wish.resolution == pytest.approx([2 * math.pi / n for n in resolution])
-    assert (done.value.wish.at, done.value.wish.limit, done.value.wish.period) == ("inverted", 5.0, 2e-3)
+    assert done.value.request.resolution == pytest.approx([2 * math.pi / n for n in resolution])
+    assert (done.value.request.at, done.value.request.limit, done.value.request.period) == ("inverted", 5.0, 2e-3)
 
 
 @pytest.mark.parametrize(

@@ -34,14 +34,14 @@ ELSEWHERE = "upright.commands"
 
 def _declared() -> dict[str, Command]:
     """Every command of this package by its words; rooms of verbs without one may need NumPy, and are not imported."""
-    found: dict[str, Command] = {}
+    commands: dict[str, Command] = {}
     for name, origin in _modules(verbs.__path__, verbs.__name__):
         if b"@command(" in Path(origin).read_bytes():
             for value in vars(import_module(name)).values():
                 if isfunction(value) and value.__module__ == name and "command" in vars(value):
-                    said = command_of(value)
-                    found[said.words] = said
-    return found
+                    command = command_of(value)
+                    commands[command.words] = command
+    return commands
 
 
 def _modules(folders: Iterable[str], package: str) -> Iterator[tuple[str, str]]:
@@ -54,12 +54,12 @@ def _modules(folders: Iterable[str], package: str) -> Iterator[tuple[str, str]]:
 
 
 DECLARED = _declared()
-COMMANDS = {words: said.line for words, said in DECLARED.items() if " " not in words}
+COMMANDS = {words: command.line for words, command in DECLARED.items() if " " not in words}
 NESTED: dict[str, dict[str, str]] = {}
 """Commands of two words, ``upright log show``, by the first."""
-for _words, _said in DECLARED.items():
+for _words, _command in DECLARED.items():
     if " " in _words:
-        NESTED.setdefault(_words.split()[0], {})[_words.split()[1]] = _said.line
+        NESTED.setdefault(_words.split()[0], {})[_words.split()[1]] = _command.line
 
 
 def elsewhere() -> dict[str, Any]:
@@ -120,11 +120,11 @@ class Commands(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands section by section."""
         sections: dict[str, list[tuple[str, str]]] = {name: [] for name in SECTIONS}
-        for words, said in (DECLARED | elsewhere()).items():
+        for words, command in (DECLARED | elsewhere()).items():
             if words.startswith(self.before):
                 try:
-                    said = said if words in DECLARED else _loaded(words, said)
-                    group, line = said.group, said.line
+                    command = command if words in DECLARED else _loaded(words, command)
+                    group, line = command.group, command.line
                 except BadInput as error:
                     group, line = Command.group, str(error)
                 section = f"upright {words.split()[0]}" if " " in words else group
@@ -160,8 +160,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         from upright._version import __version__
 
         typer.echo(f"upright {__version__}")

@@ -77,7 +77,7 @@ class SampledController:
         units = [f"{n} [{u}]" if u else n for n, u in zip(self.readings, self.reading_units, strict=True)]
         unit = f" [{self.command_unit}]" if self.command_unit else ""
         rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()] if isinstance(self.law, Law) else []
-        said = [
+        sentences = [
             *filter(None, [harmless(self.basis.first_line())]),
             f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
@@ -86,13 +86,15 @@ class SampledController:
             + (f", in steps of {self.converter.max():g}." if self.converter.any() else ", not rounded."),
         ]
         if self.references:
-            said.append(f"References: {', '.join(self.references)}" + (", as deviations from rest." if rest else "."))
+            sentences.append(
+                f"References: {', '.join(self.references)}" + (", as deviations from rest." if rest else ".")
+            )
         if self.states_from:
-            said.append(f"States from readings: {self.states_from}.")
+            sentences.append(f"States from readings: {self.states_from}.")
         if self.delay is not None:
             samples = "sample" if self.delay == 1 else "samples"
-            said.append(f"Designed for commands that act {self.delay:g} {samples} late in all.")
-        return said
+            sentences.append(f"Designed for commands that act {self.delay:g} {samples} late in all.")
+        return sentences
 
 
 def of_law(law: Any) -> SampledController:
@@ -204,8 +206,8 @@ def _without_idle_references(made: SampledController) -> SampledController:
 
 def harmless(text: str) -> str:
     """A name as it can stand in a comment or a text of any language, ending neither."""
-    kept = "".join(c if c.isprintable() else " " for c in text)
-    return kept.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *").replace('"', "'")
+    printable = "".join(c if c.isprintable() else " " for c in text)
+    return printable.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *").replace('"', "'")
 
 
 def identifiers(names: Sequence[str]) -> list[str]:

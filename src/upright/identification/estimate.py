@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -51,6 +51,7 @@ from upright.identification.search.strategy import (
     simplex,
 )
 from upright.progress import Progress, silent
+from upright.workers import one_thread
 
 __all__ = ["METHODS", "fit_percent", "identify", "predict"]
 
@@ -65,6 +66,7 @@ LOWER = 2
 """How often a search is taken up again where the profile of an interval met a lower cost."""
 
 
+@one_thread()
 def identify(
     rig: GreyBox, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True,
     near: Fit | None = None,
@@ -137,7 +139,8 @@ def _identify(
             fit, rig, runs,
             lambda kept: _identify(rig, kept, method, progress, watch=False, near=fit, conventions=log.conventions),
         )  # fmt: skip
-        return fit if log.conventions() else with_proposal(fit, fitted)
+        explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
+        return fit if explained or log.conventions() else with_proposal(fit, fitted)
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
         return conclude(replace(found, interrupted=True))
 
@@ -206,6 +209,11 @@ def _check(rig: GreyBox, runs: Sequence[Run], method: str) -> None:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")
 
 
+def least_explained(scores: Mapping[str, RunScore]) -> float:
+    """Least fit percent of a fitted signal."""
+    return min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
+
+
 def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
     """What an interrupted fit says nothing of, so that nobody takes silence for "looked at, and found nothing"."""
     return (
@@ -267,8 +275,7 @@ def _conclude(
     elif len(scored) < len(runs):
         warnings.append("What was held out is not predicted, because the fit failed.")
     unseen = () if best.lost else seen.sentences({n: p.unit for n, p in asked.parameters.items()})
-    worst = min((p for s in scores.values() if s.role == "fit" for p in s.fit_percent.values()), default=100.0)
-    conventions = tuple(log.conventions()) if worst < GOOD else ()
+    conventions = tuple(log.conventions()) if least_explained(scores) < GOOD else ()
     assumed = assumptions(best, estimates, evaluate=not brief)
     tied = () if brief else ties(best, estimates)
     estimates = with_assumptions(with_ties(estimates, tied), assumed)

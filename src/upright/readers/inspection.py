@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from upright import units
 from upright.errors import BadInput, nearest
-from upright.readers.resolution import Resolution, resolution_of, rounding
+from upright.readers.resolution import Resolution, counts_per_rev, resolution_of, rounding
 from upright.records import Array, Record
 from upright.signals.stretches import stretches
 
@@ -27,9 +27,11 @@ _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
 _LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement)\d*$", re.IGNORECASE)
 _PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|mm)", re.IGNORECASE)
 _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
-_EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?\d?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
+_EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?(?i:\d|m|motor)?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
+EFFORTS = ("V", "A", "N", "N m")
 _DRIVE = re.compile(
-    r"^(u|v|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref", re.IGNORECASE
+    r"^([uv]_?m?|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref",
+    re.IGNORECASE,
 )
 
 
@@ -159,8 +161,9 @@ def _column(record: Record, name: str) -> Column:
     guess = unit or ("1" if sample_index(x) else effort_unit(name) or _guess_unit(name, x, step))
     constant = low == high
     drive = _is_drive(name, x, guess)
-    if step.counts_per_rev and guess != "rad":
-        step = Resolution(step=step.step, decimals=step.decimals)
+    turn = {"rad": 1.0, "deg": math.pi / 180}.get(guess, 0.0)
+    exact = turn and step.step and not step.decimals
+    step = replace(step, counts_per_rev=counts_per_rev(turn * step.step) if exact else 0)
     return Column(
         name=name,
         unit=unit,
@@ -212,7 +215,7 @@ def effort_unit(name: str) -> str:
     match = _EFFORT.fullmatch(name)
     unit = (match[1] or match[2]).replace("Nm", "N m") if match else ""
     known = unit and units.known(unit)
-    return unit if known and any(units.same_dimension(unit, effort) for effort in ("V", "A", "N", "N m")) else ""
+    return unit if known and any(units.same_dimension(unit, effort) for effort in EFFORTS) else ""
 
 
 def _is_drive(name: str, values: Array, unit: str) -> bool:
@@ -220,6 +223,8 @@ def _is_drive(name: str, values: Array, unit: str) -> bool:
     if _DRIVE.search(name) or effort_unit(name):
         return True
     changes = int(np.count_nonzero(np.diff(values)))
+    if any(units.same_dimension(unit, effort) for effort in EFFORTS) and unit not in ("", "1"):
+        return 0 < changes <= 0.1 * values.size  # a potentiometer's volts change with every sample
     levels = np.unique(values).size
     return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.1 * values.size
 

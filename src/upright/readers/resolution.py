@@ -18,6 +18,7 @@ import numpy as np
 
 from upright.readers.source import Source
 from upright.records import Array
+from upright.signals.smoothing import white_noise
 
 INDEX_NAMES = ("sample", "n", "index", "i", "k", "no", "step", "row")
 
@@ -118,11 +119,15 @@ _FITS = 0.08  # rms distance from the grid in steps; 0.289 when there is no grid
 
 @dataclass(frozen=True, kw_only=True)
 class Resolution:
-    """Step of a column in its unit, 0 when there is none; `decimals` says that it is the rounding of the text."""
+    """Step of a column in its unit, 0 when there is none; `decimals` says that it is the rounding of the text.
+
+    `hidden` is what no step shows: the largest that the text's digits, or the noise, could hide, in the same unit.
+    """
 
     step: float = 0.0
     decimals: bool = False
     counts_per_rev: int = 0
+    hidden: float = 0.0
 
     def __str__(self) -> str:
         if not self.step:
@@ -146,7 +151,13 @@ def resolution_of(values: Array) -> Resolution:
         return Resolution(step=common)
     # Steps no coarser than the text's own digits tell about the text, not about the sensor.
     few = rounding > 0 and 2 < np.unique(values).size < 0.5 * values.size
-    return Resolution(step=rounding, decimals=True) if few else Resolution()
+    return Resolution(step=rounding, decimals=True) if few else Resolution(hidden=_hidden(values, rounding))
+
+
+def _hidden(values: Array, digit: float) -> float:
+    """Step that rounded text or noise hides, or a millionth of the range: rounding to q errs by q/sqrt(12), rms."""
+    noise = math.sqrt(12) * white_noise(values)
+    return max(digit, noise if noise > 2 * digit else 0.0, 1e-6 * float(np.ptp(values)))
 
 
 def _common_divisor(values: Array, digit: float) -> float:

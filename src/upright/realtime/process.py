@@ -91,10 +91,10 @@ def run_in_process(
         raise BadInput(f"this run cannot be sent to a process of its own ({error}); run it inline.") from None
     memory = context.RawArray("d", _FIELDS + 1 + _READINGS)
     phase = context.RawArray("c", 201)
-    wish = context.RawValue("b", 0)
+    stop = context.RawValue("b", 0)
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(
-        target=_child, args=(os.getpid(), order, memory, phase, wish, theirs, paced), name="upright loop"
+        target=_child, args=(os.getpid(), order, memory, phase, stop, theirs, paced), name="upright loop"
     )
     with _no_interrupt_for_the_child():
         child.start()
@@ -103,15 +103,15 @@ def run_in_process(
     answer: Any = None
     try:
         while not wait([ours, child.sentinel], _POLL):
-            _ask(wish, watch, window)
+            _ask(stop, watch, window)
         answer = ours.recv() if ours.poll(1.0) else None
     except EOFError:
         answer = None
     except KeyboardInterrupt:
-        wish.value = 1
+        stop.value = 1
         answer = ours.recv() if ours.poll(10.0) else None
     finally:
-        wish.value = 1
+        stop.value = 1
         child.join(10.0)
         if child.is_alive():
             child.kill()
@@ -132,9 +132,9 @@ def run_in_process(
     )  # fmt: skip
 
 
-def _ask(wish: Any, watch: Callable[[RunState], str], window: _Window) -> None:
+def _ask(stop: Any, watch: Callable[[RunState], str], window: _Window) -> None:
     if watch(window.get()):
-        wish.value = 1
+        stop.value = 1
 
 
 @contextmanager
@@ -154,7 +154,7 @@ def _no_interrupt_for_the_child() -> Generator[None]:
 
 
 def _child(
-    parent: int, order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection, paced: bool
+    parent: int, order: RunOrder, memory: Any, phase: Any, stop: Any, pipe: Connection, paced: bool
 ) -> None:  # fmt: skip
     import signal
 
@@ -166,7 +166,7 @@ def _child(
         return  # before anything is opened
 
     def stopped() -> str:
-        if wish.value:
+        if stop.value:
             return BY_HAND
         return "The program that started the loop is gone." if orphan() else ""
 

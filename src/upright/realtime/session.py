@@ -14,7 +14,7 @@ from upright.errors import RigStopped, UprightError
 from upright.laws import Law, Rule, as_values
 from upright.logs import LogHeader, LogWriter
 from upright.realtime.pace import Pace, Virtual
-from upright.rigs.board import SENTENCES, told
+from upright.rigs.board import SENTENCES, fault_text
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, Tick
 from upright.rigs.supervisor import Supervisor
 
@@ -266,10 +266,10 @@ def _bring(
     first = there = beside.rig.exchange(0.0).time
     while True:
         now = beside.rig.exchange(0.0)
-        if wish := stopped():
-            beside.give_up(Fault.STOP, wish)
+        if reason := stopped():
+            beside.give_up(Fault.STOP, reason)
         if now.faults:
-            beside.give_up(now.faults, f"{beside.about.name} stopped itself: {told(now.faults)}.")
+            beside.give_up(now.faults, f"{beside.about.name} stopped itself: {fault_text(now.faults)}.")
         if not beside.near():
             there = now.time
         if now.time - there >= QUIET:

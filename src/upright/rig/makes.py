@@ -422,15 +422,15 @@ def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
     source = f"data sheet of the {vendor}"
     make = make_of_vendor(vendor, plant)
     per = {"rad": (float(COUNTS), "1/rev")} | ({"m": (PER_METRE, "1/m")} if vendor == "ECP 210" else {})
-    said = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
-    said |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
+    numbers = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
+    numbers |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
     if unit in ("", "V"):
-        said |= {"converter": (CONVERTER, "V")} | ({"limit": (make.limit, "V")} if make else {})
+        numbers |= {"converter": (CONVERTER, "V")} | ({"limit": (make.limit, "V")} if make else {})
     if make and math.isfinite(make.travel):
-        said |= {"travel": (make.travel, driven_unit(type(plant)))}
+        numbers |= {"travel": (make.travel, driven_unit(type(plant)))}
     if make and math.isfinite(make.twist):
-        said |= {"twist": (make.twist, driven_unit(type(plant)))}
-    return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in said.items()}
+        numbers |= {"twist": (make.twist, driven_unit(type(plant)))}
+    return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in numbers.items()}
 
 
 def hardware_of_make(rig: Rig) -> Hardware:

@@ -115,9 +115,9 @@ class DrivenScale:
         self._shown.of_position(shown)
         self._leaned.of_position(lean)
         say = self._driven.miss, self._rho * self._leaned.miss + self._falls.miss
-        told = min(say, key=abs) if say[0] * say[1] > 0 else 0.0
-        self._both = self._kept * self._both + told * self._shown.miss
-        self._size = self._kept * self._size + told**2
+        miss = min(say, key=abs) if say[0] * say[1] > 0 else 0.0
+        self._both = self._kept * self._both + miss * self._shown.miss
+        self._size = self._kept * self._size + miss**2
         self._commands.append(command)
         self._driven.of_acceleration(self._drive * self._commands[0] + self._pull * lean)
         self._falls.of_acceleration(self._kappa * lean)

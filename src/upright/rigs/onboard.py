@@ -117,9 +117,9 @@ def ticks(period: float, tick: float) -> int:
 
 
 def _padded(values: ArrayLike, *shape: int) -> Float32:
-    given = np.asarray(values, dtype=np.float64)
+    entries = np.asarray(values, dtype=np.float64)
     out = np.zeros(shape)
-    out[tuple(slice(0, size) for size in given.shape)] = given
+    out[tuple(slice(0, size) for size in entries.shape)] = entries
     return _float32(out)
 
 

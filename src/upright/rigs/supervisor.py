@@ -23,7 +23,7 @@ from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rig import Rig
-from upright.rigs.board import Board, told
+from upright.rigs.board import Board, fault_text
 from upright.rigs.driven import DrivenScale, StillDrive
 from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
@@ -129,16 +129,16 @@ class Supervisor:
                 NO_FAULT, f"{self.about.name} has no limits, and nothing is armed without: write [limits] with "
                 f"command, and [limits.{self.about.coordinates[0]}] with travel, speed and start into its RIG.toml.",
             )  # fmt: skip
-        asked = self.duty.limits
-        assert asked is not None  # as was just asked
+        requested = self.duty.limits
+        assert requested is not None  # as was just asked
         # who stopped it by hand knows, and starts it again on purpose
         left = self.rig.exchange(0.0).faults & ~(Fault.RESET | Fault.STOP)
         if left:
-            self._give_up(left, f"{self.about.name} stopped before: {told(left)}. Look at it, then clear its fault "
-                          "(upright rig doctor --clear).")  # fmt: skip
+            self._give_up(left, f"{self.about.name} stopped before: {fault_text(left)}. Look at it, then clear its "
+                          "fault (upright rig doctor --clear).")  # fmt: skip
         self.rig.clear_fault()
-        self.held = self.rig.configure(asked)
-        if wrong := _wider(self.held, asked, self.about):
+        self.held = self.rig.configure(requested)
+        if wrong := _wider(self.held, requested, self.about):
             self._give_up(NO_FAULT, f"{self.about.name} holds other limits than it was given: {wrong}; do not run it.")
         if zero and not self.about.replayed:
             self._await_rest()
@@ -156,14 +156,14 @@ class Supervisor:
         pulse, expected = self._expected()
         self._await_rest()
         self._arm()
-        found = self.rig.self_test(pulse, PULSE)
+        result = self.rig.self_test(pulse, PULSE)
         self.rig.stop()
-        complaint = found.complaint or unlike(found, expected)
-        told_of = ", ".join(f"{n} {v:.4g}" for n, v in found.moved.items())
-        self.event(self._time, "self-test", f"a pulse of {pulse:.3g} {self.about.command_unit} moved {told_of}")
+        complaint = result.complaint or unlike(result, expected)
+        moves = ", ".join(f"{n} {v:.4g}" for n, v in result.moved.items())
+        self.event(self._time, "self-test", f"a pulse of {pulse:.3g} {self.about.command_unit} moved {moves}")
         if complaint:
             self._give_up(Fault.SELF_TEST, complaint)
-        return replace(found, complaint="")
+        return replace(result, complaint="")
 
     def aim(self, law: Law | Rule) -> Law | Rule:
         """The law as it will run from where the rig is now; still in IDLE, so that a log can be opened with it.
@@ -215,8 +215,8 @@ class Supervisor:
 
     def _arm(self) -> None:
         """Aiming and opening a log take time: whether the run is still wanted is evaluated just before."""
-        if wish := self.stopped():
-            self._give_up(Fault.STOP, wish)
+        if reason := self.stopped():
+            self._give_up(Fault.STOP, reason)
         self.rig.arm()
 
     def near(self) -> bool:
@@ -231,7 +231,7 @@ class Supervisor:
             return
         tick = self.rig.exchange(0.0)
         if tick.faults:
-            self._give_up(tick.faults, f"{self.about.name} is not started: {told(tick.faults)}.")
+            self._give_up(tick.faults, f"{self.about.name} is not started: {fault_text(tick.faults)}.")
         readings = self.readings(tick)
         if abs(readings[-1] - self.target[-1]) > self.duty.near:
             self._give_up(
@@ -253,10 +253,10 @@ class Supervisor:
         RigStopped
             When something is wrong; the command was zero before.
         """
-        if wish := self.stopped():
-            self._give_up(Fault.STOP, wish)
+        if reason := self.stopped():
+            self._give_up(Fault.STOP, reason)
         if tick.mode != self._mode or tick.faults:
-            self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
+            self._give_up(tick.faults, f"{self.about.name} stopped itself: {fault_text(tick.faults)}.")
         if self._last is not None and tick.tick <= self._last.tick:
             self._stale += 1
             if self._stale * self.about.period > self.held.watchdog:
@@ -337,8 +337,8 @@ class Supervisor:
         """Stop when an encoder lies, or must have died."""
         away = [q - t for q, t in zip(readings, self.target, strict=True)]
         watch.see([away], command)
-        said, which = watch.speaks()
-        if said[0]:
+        alarm, which = watch.speaks()
+        if alarm[0]:
             what = watch.suspicions[int(which[0])]
             self._give_up(
                 Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
@@ -369,10 +369,10 @@ class Supervisor:
         while moved.time - first.time < patience:
             tick = self.rig.exchange(0.0)
             moved = tick if tick.counts != moved.counts else moved
-            if wish := self.stopped():
-                self._give_up(Fault.STOP, wish)
+            if reason := self.stopped():
+                self._give_up(Fault.STOP, reason)
             if tick.mode != Mode.IDLE:
-                self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
+                self._give_up(tick.faults, f"{self.about.name} stopped itself: {fault_text(tick.faults)}.")
             if tick.time - moved.time >= REST:
                 return
         self._give_up(Fault.SELF_TEST, f"{self.about.name} does not come to rest within {patience:g} s; hold it still.")
@@ -382,18 +382,18 @@ class Supervisor:
         model = self.duty.model
         if model is None:
             return PULSES[1] * self.held.command, None
-        found = None
+        response = None
         for share in PULSES:
             board = Board(TwinPort(replace(model, scales=()), self.duty.zero))
             about = board.open()
             board.clear_fault()
             board.configure(replace(_free(about), command=self.held.command))
             board.arm()
-            found = board.self_test(share * self.held.command, PULSE)
-            counts = [abs(v * per) for v, per in zip(found.moved.values(), about.counts, strict=True)]
+            response = board.self_test(share * self.held.command, PULSE)
+            counts = [abs(v * per) for v, per in zip(response.moved.values(), about.counts, strict=True)]
             if min(counts) >= PLAIN:
-                return share * self.held.command, found
-        return PULSES[-1] * self.held.command, found
+                return share * self.held.command, response
+        return PULSES[-1] * self.held.command, response
 
     def _own_target(self, law: Law | Rule) -> tuple[float, ...]:
         own = law.target if isinstance(law, Law) else 0.0
@@ -453,26 +453,26 @@ def _free(about: Capabilities) -> Limits:
     return Limits(travel=wide, speed=wide, start=wide, command=about.full_scale, watchdog=1e9, saturation=1e9)
 
 
-def _wider(held: Limits, asked: Limits, about: Capabilities) -> str:
+def _wider(held: Limits, requested: Limits, about: Capabilities) -> str:
     """What a rig holds wider, or far narrower, than it was asked to."""
     for name in ("travel", "speed", "start"):
-        for which, mine, theirs in zip(about.coordinates, getattr(asked, name), getattr(held, name), strict=True):
+        for which, mine, theirs in zip(about.coordinates, getattr(requested, name), getattr(held, name), strict=True):
             if theirs > mine * (1 + 1e-6) or not theirs > 0:
                 return f"{name} of {which} {theirs:g} instead of {mine:g}"
     for name in ("command", "watchdog", "saturation"):
-        mine, theirs = getattr(asked, name), getattr(held, name)
+        mine, theirs = getattr(requested, name), getattr(held, name)
         if theirs > mine * (1 + 1e-6) + (about.period if name != "command" else 0.0):
             return f"{name} {theirs:g} instead of {mine:g}"
     return ""
 
 
-def unlike(found: SelfTest, expected: SelfTest | None) -> str:
+def unlike(measured: SelfTest, expected: SelfTest | None) -> str:
     """Why the answer to a pulse is not the model's, as sentences; empty when it is."""
     if expected is None:
         return ""
     out: list[str] = []
     for name, wanted in expected.moved.items():
-        moved = found.moved.get(name, 0.0)
+        moved = measured.moved.get(name, 0.0)
         ratio = moved / wanted if wanted else 1.0
         if abs(ratio) < 0.1:
             out.append(f"{name} hardly moved ({moved:.3g}, its model {wanted:.3g}): is its encoder connected?")

@@ -52,8 +52,8 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
     }
     place = driven_unit(plant)
     units = {n: place + unit if unit in ("", "/s") else unit for n, unit in SERVO.items()}
-    asked = [(actuator, "converter", rig.parameters["actuator.limit"].unit)]
-    for table, key, unit in (*asked, *((section, n, u) for n, u in units.items())):
+    places = [(actuator, "converter", rig.parameters["actuator.limit"].unit)]
+    for table, key, unit in (*places, *((section, n, u) for n, u in units.items())):
         if key in table:
             value, source = table.stated(key, unit)
             entries[key] = Entry(value=value, unit=unit, source=source)

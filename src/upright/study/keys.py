@@ -86,6 +86,7 @@ _SHARED = (
     Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
     Key("reader", '"table"', f"reader of the file ({', '.join(READERS.own)}), when it is not recognised"),
     Key("time", '"stamp"', "column that holds the time [s], when the reader took another one"),
+    Key("time_unit", '"ms"', "unit of the time column, when its name states none; seconds if left out"),
 )
 
 SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {

@@ -220,8 +220,8 @@ def source_of(value: Any) -> str:
     """What a number of a study rests on, in the study's own word: "known" where it says nothing of it."""
     if not isinstance(value, dict):
         return "known"
-    told: dict[str, Any] = value
-    return next((word for word in SOURCES if told.get(word)), "measured" if "uncertainty" in told else "known")
+    entry: dict[str, Any] = value
+    return next((word for word in SOURCES if entry.get(word)), "measured" if "uncertainty" in entry else "known")
 
 
 def in_si(value: Any, unit: str, what: str) -> float:

@@ -82,7 +82,7 @@ def pdf_has_folder(out: str | os.PathLike[str] | None, pdf: bool) -> None:
         raise BadInput("pdf writes into the folder out, and none was named; name one, or call .report('page.pdf').")
 
 
-def can_be_pdf(asked: bool) -> bool:
+def can_be_pdf(requested: bool) -> bool:
     """Whether a PDF is asked for.
 
     Raises
@@ -90,12 +90,12 @@ def can_be_pdf(asked: bool) -> bool:
     BadInput
         When it is, and cannot be made.
     """
-    if asked:
+    if requested:
         from upright.report.pdf import available
 
         if not available():
             raise BadInput("--pdf needs the pdf extra: pip install 'upright[pdf]', or print the page from a browser.")
-    return asked
+    return requested
 
 
 def write_page(chapter: Chapter, path: Path, pdf: bool) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from upright.workers.blocks import cut
+from upright.workers.linear_algebra import one_thread
 from upright.workers.spread import HERE, Finished, Workers, spread
 
-__all__ = ["HERE", "Finished", "Workers", "cut", "spread"]
+__all__ = ["HERE", "Finished", "Workers", "cut", "one_thread", "spread"]

@@ -20,6 +20,7 @@ from upright.errors import BadInput, WorkersLost
 from upright.progress import Progress, part, silent
 from upright.workers.carriage import carried, unpacked
 from upright.workers.labour import Cluster, Lent, Pool, Processes, do
+from upright.workers.linear_algebra import one_thread
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -147,12 +148,10 @@ def _pool(workers: Workers, items: int) -> Pool:
 
 
 def _here(task: Callable[[T, Progress], R], items: Sequence[T], progress: Progress, what: str) -> Finished[R]:
-    from threadpoolctl import threadpool_limits
-
     results: dict[int, R] = {}
     interrupted = False
     try:
-        with threadpool_limits(1, user_api="blas"):
+        with one_thread():
             for i, item in enumerate(items):
                 progress(f"{what} {i} of {len(items)}", i / len(items))
                 tell = part(progress, i / len(items), (i + 1) / len(items), f"{what} {i + 1} of {len(items)}")

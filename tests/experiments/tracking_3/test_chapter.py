@@ -84,7 +84,7 @@ def test_poles_asked_stand_beside_those_of_the_loop_as_it_runs():
     rows = tables.shaft_pole_table(whole()).rows
     assert [row[0] for row in rows] == ["open loop", *(law.name for law in LAWS)]
     for row, law in zip(rows[1:], LAWS, strict=True):
-        assert (row[1] == "–") == (law.asked.size == 0)
+        assert (row[1] == "–") == (law.requested.size == 0)
     assert "7.533" in rows[1][1]  # set 1 of Table 2: -7.533 +- 27.28j
     assert "27.28" in rows[1][1]
 

@@ -246,7 +246,7 @@ def test_a_loop_can_be_designed_where_the_growth_is_known_to_a_tenth_and_rigs_wi
     told = judged({}, standing=Standing(at="inverted", growth=growth, share=share))[2]
     assert told.answer == answer
     assert bool(told.advice) == (answer != "yes")
-    assert f"holds {100 * share:.0f} % of the rigs" in told.headline
+    assert f"stabilises {100 * share:.0f} % of the rigs" in told.headline
     # of a search that had not settled no loop follows; of one that was interrupted nothing was looked at
     for state, doubt in (({"converged": False}, "no"), ({"interrupted": True}, "not tested")):
         doubtful = judged({}, standing=Standing(at="inverted", growth=growth, share=share), **state)[2]

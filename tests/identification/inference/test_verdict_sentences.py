@@ -325,8 +325,8 @@ def test_the_loop_is_judged_on_the_fastest_pole_with_its_digits() -> None:
     told = growing(10.0, 9.9, 10.1, 0.05)
     assert told.answer == "yes"
     assert told.headline == (
-        "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); a loop whose poles are as fast as that holds "
-        "99 % of the rigs within the intervals."
+        "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); a loop with poles as fast as that "
+        "stabilises 99.4 % of the rigs within the intervals."
     )
     assert told.advice == ""
     at_limit = growing(10.0, 9.0, 11.0, 0.5)  # a tenth to either side, included
@@ -360,7 +360,7 @@ PROMISED = Bands(quantile=1.0, spreads={})
 
 def test_a_promise_is_kept_from_seven_tenths_on() -> None:
     short, kept = (promise(inside("r", n), PROMISED) for n in (69, 70))
-    assert (short.kept, kept.kept) == (False, True)
+    assert (short.holds, kept.holds) == (False, True)
     assert short.sentence == (
         "Predicted worse than the fit promises: inside the 90 % bands lie only r theta 69 % of the samples "
         "(70 % is the least)."
@@ -377,9 +377,20 @@ def test_without_bands_a_signal_may_fall_behind_the_worst_fitted_one_by_fifteen(
     fitted = {"one": {"theta": 90.0}, "two": {"theta": 99.0}}
     for percent, kept in ((75.0, True), (74.9, False)):
         told = promise({"r": score("predict", theta=percent)}, None, fitted)
-        assert told.kept == kept
+        assert told.holds == kept
         assert ("(r theta 74.9 %)" in told.sentence) != kept
-    assert promise({"r": score("predict", theta=81.0)}, None, {"one": {"theta": 99.0}}).kept  # good all the same
+    assert promise({"r": score("predict", theta=81.0)}, None, {"one": {"theta": 99.0}}).holds  # good all the same
     for percent, kept in ((80.0, True), (79.9, False)):  # never fitted: good, or not
-        assert promise({"r": score("predict", psi=percent)}, None, fitted).kept == kept
-    assert not promise({"r": score("predict", psi=79.9)}, None).kept
+        assert promise({"r": score("predict", psi=percent)}, None, fitted).holds == kept
+    assert not promise({"r": score("predict", psi=79.9)}, None).holds
+
+
+@pytest.mark.parametrize("status", ["at bound", "well determined", "poorly determined"])
+def test_a_mass_that_went_to_nothing_fails_the_fit_in_a_sentence(status: str) -> None:
+    guessed = rig(Furuta, FURUTA, {"J_d": 2e-3})
+    told = judged(estimates={"J_d": firm(5e-13, status=status, unit="kg m^2")}, rig=guessed)
+    assert told[1].answer == "no"
+    assert not trusted(told)
+    assert any(r.startswith("J_d went to nothing, 5e-13 kg m^2, from a guess of 0.002:") for r in told[1].reasons)
+    small = judged(estimates={"J_d": firm(4e-9, status="poorly determined", unit="kg m^2")}, rig=guessed)
+    assert not any("went to nothing" in r for r in small[1].reasons)  # 2 millionths are small, and still a number

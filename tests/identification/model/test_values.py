@@ -125,7 +125,7 @@ def test_residuals_are_counted_where_they_are_scored() -> None:
     assert posed().count(1.0) == 101
     assert posed(horizon=0.5).count() == 8 * 51
     held = posed()
-    held.tracks = [replace(held.tracks[0], kept=np.arange(401) % 4 == 0)]
+    held.tracks = [replace(held.tracks[0], retained=np.arange(401) % 4 == 0)]
     assert held.count() == 101
     assert held.count(1.0) == 26
     assert held.duration == pytest.approx(4.0)

@@ -37,11 +37,11 @@ def comments(*tables: TomlTable) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("column", "unit", "factor"),
     [
-        (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "mV", 1.0), (col("u"), "", 1.0),
-        (col("u", "counts", lies=DAC), "V", 1 / 819),
+        (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "V", 1e-3), (col("u"), "", 1.0),
+        (col("u", "kN"), "N", 1e3), (col("u", "N mm"), "N m", 1e-3), (col("u", "counts", lies=DAC), "V", 1 / 819),
     ],
 )  # fmt: skip
-def test_a_command_has_the_unit_it_states_or_that_of_its_converter(column, unit, factor):
+def test_a_command_has_its_unit_without_a_prefix_or_that_of_its_converter(column, unit, factor):
     assert command_unit(column) == (unit, factor)
 
 
@@ -77,7 +77,12 @@ THETA, X = Coordinate("theta", "rad", "angle"), Coordinate("x", "m", "place")
          {"unit": "m", "resolution": {"value": "0.003142 m", "measured": True}, "offset": 0.0}),
         (THETA, col("a", "rad", resolution=Resolution(step=0.02)), 0, False,
          {"unit": "rad", "resolution": {"value": "0.02 rad", "measured": True}, "offset": 0.0}),
-        (X, col("a", "mm", resolution=Resolution(step=0.02)), 0, False, {"unit": "mm", "offset": 0.0}),
+        (X, col("a", "mm", resolution=Resolution(step=0.02)), 0, False,
+         {"unit": "mm", "resolution": {"value": "0.02 mm", "measured": True}, "offset": 0.0}),
+        (X, col("a", "mm", resolution=Resolution(step=0.1, decimals=True)), 0, False,
+         {"unit": "mm", "resolution": {"value": "0.1 mm", "assumed": True}, "offset": 0.0}),
+        (THETA, col("a", "deg", resolution=Resolution(hidden=0.01)), 0, False,
+         {"unit": "deg", "resolution": {"value": "0.01 deg", "assumed": True}, "offset": 0.0}),
         (X, col("a", high=100.0), 0.99e-7, False, {"offset": 0.0}),
         (X, col("a", high=100.0), 1.01e-7, False, {"offset": 1.01e-7}),
         (X, col("a", low=-100.0, high=0.0), -0.99e-7, False, {"offset": 0.0}),
@@ -248,11 +253,11 @@ def test_a_balanced_pendulum_is_sized_by_the_rate_at_which_it_falls():
 def test_numbers_of_a_balanced_pendulum_follow_from_its_inertia():
     cart = starts_upright(UPRIGHT, "cart-pendulum")
     assert {n: v for n, (v, _) in cart.assumed.items()} == {"m_p": 0.1, "J_p": 0.0, "m_c": 0.5}
-    assert cart.asked == pytest.approx({"l_cg": LEVER, "b_1": 1.0, "b_1c": 0.12})
+    assert cart.guesses == pytest.approx({"l_cg": LEVER, "b_1": 1.0, "b_1c": 0.12})
     assert cart.uncertain == {}
     arm, inertia = starts_upright(UPRIGHT, "furuta"), 0.2 * (0.8 * LEVER) ** 2
     assert {n: v for n, (v, _) in arm.assumed.items()} == {"m_p": 0.1, "J_p": 0.0}
-    assert arm.asked == pytest.approx(
+    assert arm.guesses == pytest.approx(
         {"l_cg": LEVER, "b_1": 2 * inertia, "b_1c": 0.24 * inertia, "J_d": inertia / 2, "k_psi": 2 * inertia}
     )
     assert arm.uncertain == {"r": (pytest.approx(0.8 * LEVER), "30 %")}

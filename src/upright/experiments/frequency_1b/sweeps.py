@@ -149,8 +149,8 @@ def _probed(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, goal: Array,
     best, miss = amplitude, np.full(lengths.size, math.inf)
     for _ in range(PROBES):
         y = sines(rig, lengths, amplitude, seconds)[1]
-        seen = np.array([_peak(y[:, :, i], int(n), rig.period * EVERY) for i, n in enumerate(lengths)])
-        over = np.max(np.maximum(seen, rig.resolution) / goal, axis=1)  # above 1: more than was asked
+        peaks = np.array([_peak(y[:, :, i], int(n), rig.period * EVERY) for i, n in enumerate(lengths)])
+        over = np.max(np.maximum(peaks, rig.resolution) / goal, axis=1)  # above 1: more than was asked
         off = np.abs(np.log(over))
         best, miss = np.where(off < miss, amplitude, best), np.minimum(off, miss)
         low, high = np.where(over < 1, amplitude, low), np.where(over < 1, high, amplitude)

@@ -32,7 +32,7 @@ def bench(rig: Rig, make: Make) -> dict[str, float]:
     return {n: true[n] * (1 + s * z) for (n, s), z in zip(make.bench.items(), off, strict=True)}
 
 
-def asked(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]) -> GreyBox:
+def model_of(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]) -> GreyBox:
     """What a fit may know about a rig of a make: the design's numbers as guesses, and what is known, how well."""
     design, plant = make_rig(make.key), type(make.plant)
     parameters: dict[str, Parameter] = {}

@@ -65,12 +65,12 @@ class Lie:
 
     name: str
     factor: float
-    found: float
+    estimate: float
     error: float
     refused: bool
     spoke: float
     tilt: float
-    said: str
+    suspicion: str
     fell: float
 
 
@@ -194,14 +194,14 @@ def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = N
             raise BadInput(f"'{c.name}' is in {unit}, and {c.unit} or counts were needed; say so in the log's header.")
         signals[c.name] = (log[c.name] - log[c.name][0]) * size
     units = {c.name: c.unit for c in model.plant.coordinates} | {"u": model.unit}
-    found = scales(model, log.replace(signals=signals, units=units, inputs=("u",), outputs=tuple(signals)[1:]), known)
-    true = np.abs(found.motion[:, 1] / found.value[1]).max()
+    result = scales(model, log.replace(signals=signals, units=units, inputs=("u",), outputs=tuple(signals)[1:]), known)
+    true = np.abs(result.motion[:, 1] / result.value[1]).max()
     if true < LEAST:
         raise NotIdentifiable(
             f"by the model the pendulum swings to {math.degrees(true):.0f} degrees only, where its period hardly tells "
             f"its amplitude; drive it to {math.degrees(LEAST):.0f} or more, 100 is best, then let it coast."
         )
-    return found
+    return result
 
 
 def run_swing_up(
@@ -302,27 +302,27 @@ def _lies(
     names = [c.name for c in model.plant.coordinates]
     sampled = model.linear("inverted").to_sampled(model.period, (model.delay + model.lag) / model.period)
     law_upright = feedback(filtered(sampled, law.memory), law.K[None])
-    told = [(name or names[0], factor) for name, factor in LIES]
+    factors = [(name or names[0], factor) for name, factor in LIES]
     checks: list[Scales] = []
     runs: list[tuple[Array, Array, Array]] = []
-    for name, factor in told:
+    for name, factor in factors:
         rig = replace(truth, scales=tuple(factor if n == name else 1.0 for n in names))
         checks.append(scales(model, shown_by_encoders(rig, command), known))
         rest = readings(rig, list(rig.plant.equilibrium("inverted").values()))  # zeroed by a hand that holds it upright
         went = trial(rig, law_upright, at="inverted", start=[0.0, 0.0, TILT, 0.0], seconds=seconds, rest=rest)
-        seen = np.column_stack([went.record[n] for n in names]) - rest
-        runs.append((seen, went.u, np.abs(went.deviation[:, 1])))
+        measured = np.column_stack([went.record[n] for n in names]) - rest
+        runs.append((measured, went.u, np.abs(went.deviation[:, 1])))
     alarm = Watch(model).over(np.stack([r[0] for r in runs], axis=-1), np.column_stack([r[1] for r in runs]))
     out: list[Lie] = []
-    for i, (name, factor) in enumerate(told):
+    for i, (name, factor) in enumerate(factors):
         at, column, away = int(alarm.sample[i]), names.index(name), runs[i][2]
         beyond = np.flatnonzero(away > FALLEN)
         out.append(
             Lie(
-                name=name, factor=factor, found=float(checks[i].value[column]), error=float(checks[i].error[column]),
+                name=name, factor=factor, estimate=float(checks[i].value[column]), error=float(checks[i].error[column]),
                 refused=name in checks[i].wrong, spoke=at * model.period if at >= 0 else math.inf,
                 tilt=float(away[at]) if at >= 0 else 0.0,
-                said=str(alarm.what[i]) if alarm.what[i] != Suspicion() else "",
+                suspicion=str(alarm.what[i]) if alarm.what[i] != Suspicion() else "",
                 fell=float(beyond[0]) * model.period if beyond.size else math.inf,
             )
         )  # fmt: skip

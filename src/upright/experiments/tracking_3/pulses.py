@@ -92,8 +92,8 @@ def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
     for name, value in make.plant.parameters().items():
         unit = make.plant.quantity(name).unit
         if name in known:
-            told, error = with_unit(known[name].value, unit, 6), with_unit(known[name].stderr, unit, 2)
-            parameters.key(name, {"value": told, "uncertainty": error}, "experiment 1a")
+            text, error = with_unit(known[name].value, unit, 6), with_unit(known[name].stderr, unit, 2)
+            parameters.key(name, {"value": text, "uncertainty": error}, "experiment 1a")
         elif value:
             parameters.key(name, {"guess": with_unit(value * rng.choice([0.7, 1.3]), unit, 4), "min": 0})
     actuator = TomlTable("[actuator]", "the loop's poles do not depend on the gain, masses and springs do")

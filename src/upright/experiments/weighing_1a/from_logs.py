@@ -64,34 +64,34 @@ def weigh_logs(
             f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
         ),
     ]
-    told = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
+    page = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
                            signals=signals, left_out=left_out, steps=steps)  # fmt: skip
-    return weighed, told
+    return weighed, page
 
 
 def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Chapter]:
     """The same of a twin that is stepped here; its logs go into the folder, where one is named."""
     if kind not in OSCILLATORS:
         raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
-    done = measure_body(drawn_twin(seed, kind))
-    column = next(iter(done.logs.values())).outputs[0]
-    done = done if folder is None else done.written(folder)
-    files = done.files
+    result = measure_body(drawn_twin(seed, kind))
+    column = next(iter(result.logs.values())).outputs[0]
+    result = result if folder is None else result.written(folder)
+    files = result.files
     steps = [Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}")]
     if files:
-        again = f"upright loadings {' '.join(files.values())} {added_options(done, files)}"
+        again = f"upright loadings {' '.join(files.values())} {added_options(result, files)}"
         steps.insert(0, Step("Weigh the rig again from its logs in that folder, as you would your own.", again))
-    told = loading_chapter(
-        done.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
-        signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=done.truth, steps=steps,
+    page = loading_chapter(
+        result.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=result.logs,
+        signals=dict.fromkeys(result.logs, column), left_out=result.left_out, truth=result.truth, steps=steps,
     )  # fmt: skip
-    return done.loadings, told
+    return result.loadings, page
 
 
-def _column(record: Record, asked: str, known: tuple[str, ...], option: str) -> str:
-    if asked:
-        _ = record[asked]
-        return asked
+def _column(record: Record, requested: str, known: tuple[str, ...], option: str) -> str:
+    if requested:
+        _ = record[requested]
+        return requested
     if len(known) == 1:
         return known[0]
     raise BadInput(f"The log holds the columns {', '.join(record.names)}; say which one is meant with {option}.")

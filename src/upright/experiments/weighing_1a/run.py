@@ -180,11 +180,11 @@ def measure_body(
             logs[f"{count} masses, run {shot + 1}"] = step_log(on, count, shot=shot)
             values.append(count * design.piece)
     signals = {label: record.outputs[0] for label, record in logs.items()}
-    found, left_out = weigh(
+    loadings, left_out = weigh(
         logs, values, signals, dict.fromkeys(logs, "u"), tolerance=design.tolerance, piece=design.piece
     )  # fmt: skip
     return Campaign(
-        kind=design.kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=found, left_out=left_out,
+        kind=design.kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=loadings, left_out=left_out,
         truth=twin_truth(on), on=on,
     )  # fmt: skip
 
@@ -228,22 +228,22 @@ def run_weighing(stand: TestStand, seed: int, folder: Path, progress: Progress =
     """
     rig = stand.rig
     if not stand.simulated:
-        done = step_stand(stand, folder, progress)
-        bare = done.loadings.bare
-        known = (Known(name=OSCILLATORS[done.kind].inertia, value=bare.value, stderr=bare.stderr),)
-        return Weighing(rig=rig, make=None, folder=folder, campaign=done, known=known, tolerance=stand.tolerance)
+        result = step_stand(stand, folder, progress)
+        bare = result.loadings.bare
+        known = (Known(name=OSCILLATORS[result.kind].inertia, value=bare.value, stderr=bare.stderr),)
+        return Weighing(rig=rig, make=None, folder=folder, campaign=result, known=known, tolerance=stand.tolerance)
     make = _make(rig)
-    done = measure_body(first_body(replace(rig, seed=seed)), progress).written(folder)
-    found, mounted = done.loadings, make.mounted
+    result = measure_body(first_body(replace(rig, seed=seed)), progress).written(folder)
+    loadings, mounted = result.loadings, make.mounted
     spread = make.oscillator.tolerance * mounted.each * math.sqrt(mounted.pieces)
     body = Known(
         name=make.body,
-        value=found.bare.value + mounted.each * mounted.pieces + mounted.rest,
-        stderr=math.hypot(found.bare.stderr, spread, mounted.rest_error),
+        value=loadings.bare.value + mounted.each * mounted.pieces + mounted.rest,
+        stderr=math.hypot(loadings.bare.stderr, spread, mounted.rest_error),
     )
     spring = "k_12" in rig.plant.names()
-    known = (body, Known(name="k_12", value=found.k.value, stderr=found.k.stderr)) if spring else (body,)
-    return Weighing(rig=rig, make=make, folder=folder, campaign=done, known=known)
+    known = (body, Known(name="k_12", value=loadings.k.value, stderr=loadings.k.stderr)) if spring else (body,)
+    return Weighing(rig=rig, make=make, folder=folder, campaign=result, known=known)
 
 
 def kind_of(plant: Plant) -> str:
@@ -282,18 +282,18 @@ def step_stand(stand: TestStand, folder: Path, progress: Progress = silent) -> C
         signal = _steps(level, seconds, stand.rig.period)
         record = stand.run(signal, folder, f"loaded_{i}" if i else "probe", bolted=true)
         if i == 0:
-            seen = float(np.ptp(record[name])) / 4  # a step swings to twice where it rests, to either side
-            level = min(SHARE * stand.rig.limit, GROWTH / PROBE * level, level * wanted / max(seen, 1e-12))
+            amplitude = float(np.ptp(record[name])) / 4  # a step swings to twice where it rests, to either side
+            level = min(SHARE * stand.rig.limit, GROWTH / PROBE * level, level * wanted / max(amplitude, 1e-12))
             continue
         label = text if text not in logs else f"{text}, run {i}"
         logs[label], files[label] = record, file_of(record)
-    found, left_out = weigh(
+    loadings, left_out = weigh(
         logs, values, dict.fromkeys(logs, name), dict.fromkeys(logs, APPLIED), tolerance=stand.tolerance
     )
     body, true = OSCILLATORS[kind], stand.truth
     truth = {"k": true["k_1"], body.bare: true[body.inertia], "c": true["c_1"]} if true else {}
     return Campaign(
-        kind=kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=found, left_out=left_out,
+        kind=kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=loadings, left_out=left_out,
         truth=truth, files=files,
     )  # fmt: skip
 
@@ -301,9 +301,9 @@ def step_stand(stand: TestStand, folder: Path, progress: Progress = silent) -> C
 def _added(stand: TestStand) -> list[float]:
     """Loadings of RIG.toml [kg or kg m^2]."""
     kind = kind_of(stand.rig.plant)
-    said = [inertia_of(text) for text in stand.added]
-    if {k for _, k in said if k} == {kind} and len({a for a, _ in said}) > 1:
-        return [a for a, _ in said]
+    stated = [inertia_of(text) for text in stand.added]
+    if {k for _, k in stated if k} == {kind} and len({a for a, _ in stated}) > 1:
+        return [a for a, _ in stated]
     unit, piece = OSCILLATORS[kind].unit, OSCILLATORS[kind].piece
     raise BadInput(
         f"experiment 1a needs two or more different loadings in {unit}, such as, in RIG.toml, [loadings] "

@@ -66,7 +66,7 @@ class RigExport:
     rig: Rig
     called: str
     folder: Path
-    kept: Callable[[], Path]
+    store: Callable[[], Path]
     limit: float | None = None
 
 

@@ -71,8 +71,8 @@ def response_of(
     covered = sum(b - a for a, b, _ in pieces) / sum(len(r) for r in records)
     if kind == "sines" or (not kind and covered > 0.5):
         found = _sines(records, command, outputs, quanta, hold)
-    elif kind == "multisine" or (not kind and len(records) == 1 and repetition(u) is not None):
-        found = multisine_response(records[0], command, outputs, quanta, hold)
+    elif kind == "multisine" or (not kind and all(repetition(r[command]) is not None for r in records)):
+        found = multisine_response(records, command, outputs, quanta, hold)
     else:
         found = _sweep(records, command, outputs, quanta, hold)
     if band is not None:
@@ -287,46 +287,78 @@ def repetition(u: Array) -> int | None:
 
 
 def multisine_response(
-    record: Record, command: str, outputs: Sequence[str], quanta: Array, hold: float
+    records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
 ) -> FrequencyResponse:
-    """Response at the lines of a command that repeats.
+    """Response at the lines of a command that repeats, over the periods of all logs.
 
     Raises
     ------
     NotIdentifiable
-        When it does not repeat often enough.
+        When it does not repeat often enough, or the logs hold different commands.
     """
-    u = record[command]
-    length = repetition(u)
-    if length is None or u.size < 3 * length:
-        raise NotIdentifiable("A multisine needs a command that repeats three times at least; try --kind sweep.")
-    periods = u.size // length
-    y = np.column_stack([record[n] for n in outputs])
-    tail = slice(u.size - periods * length, None)
-    Y = np.fft.rfft(_level(y[tail].reshape(periods, length, -1)), axis=1) * 2 / length
-    U = np.fft.rfft(u[tail].reshape(periods, length), axis=1) * 2 / length
-    size = np.abs(U.mean(axis=0))
-    lines = np.flatnonzero(size > 1e-2 * size[1:].max())
-    lines = lines[lines > 0]
-    begin = settled(Y[:, lines].reshape(periods, -1), tolerance=0.01, window=3)
-    notes = () if begin is not None else ("The transient had not died away at the end.",)
-    begin = min(begin if begin is not None else periods // 2, periods - 2)
-    Y, U = Y[begin:], U[begin:]
+    first, period = records[0], records[0].period
+    each = [_periods(record, command, outputs) for record in records]
+    u, length = each[0][1].mean(axis=0), each[0][1].shape[1]
+    notes: list[str] = []
+    heard: list[Complex] = []
+    driven: list[Complex] = []
+    for record, (y, v) in zip(records, each, strict=True):
+        if v.shape[1] != length or abs(record.period / period - 1) > 1e-6:
+            raise NotIdentifiable(
+                f"The logs of a multisine need one period, and hold {length * period:.4g} and "
+                f"{v.shape[1] * record.period:.4g} s; give those of another period by themselves."
+            )
+        # a log may begin anywhere in the period
+        match = np.fft.irfft(np.fft.rfft(u) * np.conj(np.fft.rfft(v.mean(axis=0))), length)
+        y, v = (np.roll(x, int(np.argmax(match)), axis=1) for x in (y, v))
+        Y, U = (np.fft.rfft(x, axis=1) * 2 / length for x in (y, v))
+        lines = _lines(U)
+        begin = settled(Y[:, lines].reshape(len(Y), -1), tolerance=0.01, window=3)
+        if begin is None:
+            notes.append("The transient had not died away at the end.")
+        begin = min(begin if begin is not None else len(Y) // 2, len(Y) - 2)
+        heard.append(Y[begin:])
+        driven.append(U[begin:])
+    Y, U = np.concatenate(heard), np.concatenate(driven)
+    lines = _lines(U)
     count = Y.shape[0]
     mean, drive = Y.mean(axis=0), U.mean(axis=0)[lines]
     scatter = np.sum(np.abs(Y[:, lines] - mean[lines]) ** 2, axis=0) / max(count - 1, 1)
     rounding = 4 * quanta**2 / 12 / length
     cross = np.abs(np.sum(Y[:, lines] * np.conj(U[:, lines, None]), axis=0)) ** 2
     both = np.sum(np.abs(Y[:, lines]) ** 2, axis=0) * np.sum(np.abs(U[:, lines]) ** 2, axis=0)[:, None]
-    omega = np.asarray(2 * math.pi * lines / (length * record.period), dtype=np.float64)
-    dry, still = _friction(mean, lines, length, record.period)
+    omega = np.asarray(2 * math.pi * lines / (length * period), dtype=np.float64)
+    dry, still = _friction(mean, lines, length, period)
     return FrequencyResponse(
         omega=omega, response=mean[lines] / drive[:, None], outputs=tuple(outputs),
-        units=_units(record, outputs, command), input=command,
+        units=_units(first, outputs, command), input=command,
         variance=np.maximum(scatter / count, rounding) / np.abs(drive[:, None]) ** 2,
         coherence=cross / np.maximum(both, 1e-300), distortion=_between(mean, lines), drive=drive, dry=dry, still=still,
-        together=True, hold=hold, notes=(*notes, f"{count} periods of {length * record.period:.3g} s averaged."),
+        together=True, hold=hold,
+        notes=(*dict.fromkeys(notes), f"{count} periods of {length * period:.3g} s averaged."),
     )  # fmt: skip
+
+
+def _lines(U: Complex) -> NDArray[np.int64]:
+    """Those at which a command asks."""
+    size = np.abs(U.mean(axis=0))
+    size[0] = 0.0
+    return np.flatnonzero(size > 1e-2 * size.max())
+
+
+def _periods(record: Record, command: str, outputs: Sequence[str]) -> tuple[Array, Array]:
+    """Whole periods of outputs, without their drift, and of the command: (periods, samples, n) and (periods, samples).
+
+    The last samples of the log are the last of a period.
+    """
+    u = record[command]
+    length = repetition(u)
+    if length is None or u.size < 3 * length:
+        raise NotIdentifiable("A multisine needs a command that repeats three times at least; try --kind sweep.")
+    periods = u.size // length
+    tail = slice(u.size - periods * length, None)
+    y = np.column_stack([record[n] for n in outputs])[tail].reshape(periods, length, -1)
+    return _level(y), u[tail].reshape(periods, length)
 
 
 def _level(y: Array) -> Array:

@@ -46,7 +46,9 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
     assumed = [p for p in problem.rig.parameters.values() if p.assumed]
     if not assumed:
         return ()
-    asked = [i for i, u in enumerate(problem.unknowns) if u.shared and u.asked and not best.pinned[i] and value[i] != 0]
+    asked = [
+        i for i, u in enumerate(problem.unknowns) if u.shared and u.estimated and not best.pinned[i] and value[i] != 0
+    ]
     unknowns = [problem.unknowns[i] for i in asked]
     moves, sizes = _moves(best, assumed, asked) if evaluate else (None, None)
     found: list[Assumption] = []

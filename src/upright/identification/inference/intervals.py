@@ -54,15 +54,15 @@ def shared_estimates(
     budget = AFFORDED if profiles else 0.0
     for i in best.shared:
         u, plain = best.problem.unknowns[i], beside_bound(best, i)
-        if u.name in hidden or (u.asked and not best.pinned[i] and plain.zero_wide):
+        if u.name in hidden or (u.estimated and not best.pinned[i] and plain.zero_wide):
             found[u.name] = replace(plain, status="nuisance") if u.name.startswith(NOISE) else _unseen(plain)
             continue
         firm = "poorly determined" if best.explains_nothing else "well determined"
-        status = firm if u.asked else "known"
+        status = firm if u.estimated else "known"
         interval = plain.interval
         wide = plain.half > WIDE
         near = best.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
-        if u.asked and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
+        if u.estimated and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
             if profile_work(best) < budget:
                 budget -= profile_work(best)
                 interval = profile(best, i, plain, best.quantile, log)

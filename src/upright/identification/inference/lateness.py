@@ -81,7 +81,9 @@ def lateness(best: Optimum) -> Lateness | None:
     run, signal = worst = min(before, key=lambda key: before[key])
     half = best.quantile * best.sigma
     bent = tuple(
-        u.name for i, u in enumerate(problem.unknowns) if u.shared and u.asked and abs(found.x[i] - x[i]) > half[i] > 0
+        u.name
+        for i, u in enumerate(problem.unknowns)
+        if u.shared and u.estimated and abs(found.x[i] - x[i]) > half[i] > 0
     )
     cost = f", and moves {', '.join(bent)} out of what the intervals say" if bent else ""
     ms = [f"{1e3 * value:.3g}" for value in (delay, delay - error, delay + error)]

@@ -53,13 +53,16 @@ class Tie:
 
 
 def ties(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Tie, ...]:
-    """Every number that is tied, with the one that it is tied to most; each pair once, the tightest first."""
+    """Every number that is tied, with the one that it is tied to most; each pair once, the tightest first.
+
+    One that ended at its bound may have left its share to another: they are correlated as they would be off the bound.
+    """
     unknowns, values = best.problem.unknowns, best.values
     places = [
         i
         for i in best.shared
-        if unknowns[i].asked and not best.pinned[i] and not unknowns[i].name.startswith(NOISE)
-        and math.isfinite(estimates[unknowns[i].name].stderr) and best.sigma[i] > 0
+        if unknowns[i].estimated and not unknowns[i].name.startswith(NOISE)
+        and math.isfinite(estimates[unknowns[i].name].stderr) and best.matrix[i, i] > 0
     ]  # fmt: skip
     if best.lost or len(places) < 2:
         return ()

@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from upright.basis import NOT_SUPPORTED, in_percent
 from upright.identification.inference.assumptions import resting
 from upright.identification.inference.ceiling import ENOUGH, Judged
 from upright.identification.inference.loop import Standing
@@ -28,6 +29,9 @@ MARGIN = 2.0
 
 VAGUE = 10.0
 """An interval of a positive number whose ends are this many times apart leaves it undetermined."""
+
+VANISHED = 1e-6
+"""Share of its guess below which a mass has vanished: no guess of a rig's is a million times too large."""
 
 ESSENTIAL = ("J_", "m_", "k_", "l_", "actuator.gain")
 """Numbers without which a model is none: inertias, stiffnesses, lengths, the drive; friction is often vague."""
@@ -78,7 +82,7 @@ class Evidence:
 def judge(found: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(found)
-    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
+    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found, supported=predicts.answer != "no")
     if found.interrupted:
         return predicts, *map(_not_evaluated, others)
     if predicts.answer != "no":
@@ -225,7 +229,14 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
     for n, e in asked.items():
         low, high = e.given or e.interval
         limit = found.rig.bounds(n) if n in found.rig.parameters else (-math.inf, math.inf)
-        if e.status == "at bound" and e.value != 0:
+        if _vanished(found.rig, n, e):
+            no = True
+            reasons.append(
+                f"{n} went to nothing, {e.value:.1g} {e.unit}, from a guess of {found.rig.parameters[n].value:.2g}: a "
+                "degenerate optimum, so the other numbers are not the rig's either. Measure it or the drive's gain and "
+                "give that as known, and look at the drive's sign."
+            )
+        elif e.status == "at bound" and e.value != 0:
             no = True
             reasons.append(
                 f"{n} reached its {'lower' if e.value <= limit[0] else 'upper'} limit, {_shown(e.value, e)}: the data "
@@ -327,6 +338,12 @@ def _share(half: float) -> str:
     return f"{math.ceil(percent / step - 1e-9) * step:.2g} %"
 
 
+def _vanished(rig: GreyBox, name: str, e: Estimate) -> bool:
+    """Whether a mass, inertia, length or gain that cannot be zero was driven there."""
+    guess = rig.parameters[name].value if name in rig.parameters else 0.0
+    return name.startswith(("m_", "J_", "l_", "actuator.gain")) and 0 < abs(e.value) < VANISHED * abs(guess)
+
+
 def _lumped(rig: GreyBox) -> list[str]:
     """Numbers that stand for something else than their name, because another was set to zero."""
     p = rig.parameters
@@ -335,7 +352,7 @@ def _lumped(rig: GreyBox) -> list[str]:
     return []
 
 
-def _loop(found: Evidence) -> Judgement:
+def _loop(found: Evidence, *, supported: bool) -> Judgement:
     s = found.standing
     if found.lost:
         return Judgement(question=LOOP, answer="not tested", headline="Not evaluated: the fit failed.")
@@ -359,7 +376,11 @@ def _loop(found: Evidence) -> Judgement:
             advice="Add a run in which it acts.",
         )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
-    held = f"a loop whose poles are as fast as that holds {100 * s.share:.0f} % of the rigs within the intervals"
+    held = f"a loop with poles as fast as that stabilises {in_percent(s.share)} of the rigs within the intervals"
+    if not supported:
+        held = (
+            f"how many of the rigs within the intervals a loop with poles as fast as that stabilises is {NOT_SUPPORTED}"
+        )
     answer = "no"
     if half <= NARROW and s.share >= SURE:
         answer = "yes"

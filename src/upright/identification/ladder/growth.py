@@ -47,7 +47,7 @@ from upright.identification.search.strategy import (
     settle_weights,
 )
 from upright.progress import Progress, part, silent
-from upright.workers import HERE, Workers
+from upright.workers import HERE, Workers, one_thread
 
 Array = NDArray[np.float64]
 Percents = Mapping[str, Mapping[str, float]]
@@ -115,6 +115,7 @@ class Ladder:
         return tuple(s for s in self.steps if s.accepted)
 
 
+@one_thread()
 def climb(
     rig: GreyBox, runs: Sequence[Run], rungs: Sequence[Rung] | None = None, *, progress: Progress = silent,
     workers: Workers = HERE,

@@ -139,7 +139,7 @@ class Problem:
     def count(self, horizon: float = math.inf) -> int:
         """Number of residuals within `horizon` seconds."""
         return sum(
-            (t.within(horizon) if t.kept is None else int(np.count_nonzero(t.kept[: t.within(horizon)])))
+            (t.within(horizon) if t.retained is None else int(np.count_nonzero(t.retained[: t.within(horizon)])))
             * t.restarts.size * max(1, int(np.count_nonzero(t.weights)))
             for t in self.tracks
         )  # fmt: skip
@@ -332,7 +332,7 @@ class Problem:
             self._memory = np.empty(most)
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
         skip = min(track.first, n - 1)
-        counts = slice(skip, n) if track.kept is None else np.flatnonzero(track.kept[:n])
+        counts = slice(skip, n) if track.retained is None else np.flatnonzero(track.retained[:n])
         seen = [motion[counts, c] for c in track.columns]
         if track.principal is None:
             G = squares(seen, track.y[counts], d.offsets, track.weights, d.scales)
@@ -422,7 +422,7 @@ def resolved(rig: GreyBox, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> 
     least = _shortest(rig, runs)
     return [
         replace(u, lower=least[u.name], value=max(u.value, least[u.name]))
-        if u.asked and u.name in least and u.lower < least[u.name] <= u.upper
+        if u.estimated and u.name in least and u.lower < least[u.name] <= u.upper
         else u
         for u in unknowns
     ]
@@ -434,14 +434,14 @@ def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
     return tuple(
         u.name
         for u, value in zip(problem.unknowns, problem.value(x), strict=True)
-        if u.asked and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
+        if u.estimated and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
     )
 
 
 def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
     """Limits at coordinates `x` that no run reaches: knees and largest forces without which the cost is the same."""
     plant = problem.rig.plant
-    limits = [i for i, u in enumerate(problem.unknowns) if u.asked and u.shared and u.log]
+    limits = [i for i, u in enumerate(problem.unknowns) if u.estimated and u.shared and u.log]
     limits = [i for i in limits if math.isinf(neutral(plant, problem.unknowns[i].name))]
     most = problem.cost(x) * (1 + SAME) if limits else 0.0
 
@@ -479,7 +479,7 @@ def noise_level(problem: Problem, x: Array) -> float:
     for index, track in enumerate(problem.tracks):
         y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
         e = (y - track.targets(track.length)) @ track.weighting.T
-        e = np.moveaxis(e if track.kept is None else e[track.kept], 1, 0)
+        e = np.moveaxis(e if track.retained is None else e[track.retained], 1, 0)
         e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
         alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
         squares += alike * float(np.sum(e * e))

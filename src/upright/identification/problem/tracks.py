@@ -108,7 +108,7 @@ class Track:
     variance: Array
     ahead: FilterPlan | None = None
     missed: Array | None = None
-    kept: NDArray[np.bool_] | None = None
+    retained: NDArray[np.bool_] | None = None
 
     @property
     def windowed(self) -> bool:
@@ -192,7 +192,7 @@ class Track:
         if self.run.t.size < LEAST_RUN or not judges.any():
             return np.zeros(count, dtype=bool), self
         if not self.windowed:
-            return judges, replace(self, kept=~judges)
+            return judges, replace(self, retained=~judges)
         stay = ~judges
         return judges, replace(self, restarts=self.restarts[stay], x0=self.x0[stay], variance=self.variance[stay])
 
@@ -201,7 +201,7 @@ class Track:
         skip = min(self.first, len(y) - 1)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away is told by its NaN
             e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
-        return e if self.kept is None else e * self.kept[skip : len(y), None, None]
+        return e if self.retained is None else e * self.retained[skip : len(y), None, None]
 
     def targets(self, samples: int) -> Array:
         """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""

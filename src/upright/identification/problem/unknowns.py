@@ -50,7 +50,7 @@ class Unknown:
     log: bool
     scale: float
     prior: tuple[float, float] | None = None
-    asked: bool = True
+    estimated: bool = True
     group: str = ""
 
     @property
@@ -98,7 +98,7 @@ def _shared(rig: GreyBox, p: Parameter) -> Unknown:
     scale = 1.0 if log else max(size, p.uncertainty) or _FALLBACK.get(p.name, 1e-3)
     return Unknown(
         name=p.name, runs=SHARED, value=value, lower=lower, upper=upper, log=log, scale=scale, prior=prior,
-        asked=p.estimate,
+        estimated=p.estimate,
     )  # fmt: skip
 
 

@@ -161,7 +161,7 @@ class Agreement:
 
 def regress(rig: GreyBox, samples: list[Sample]) -> Agreement:
     """Least squares on the accelerations over the numbers to estimate."""
-    unknowns = [u for u in shared_unknowns(rig) if u.asked]
+    unknowns = [u for u in shared_unknowns(rig) if u.estimated]
     base = base_values(rig)
     count = sum((s.q.shape[1] - 2 * min(s.edge, s.q.shape[1] // 4)) * len(s.free) for s in samples)
     x0 = np.array([_coordinate(u, base[u.name]) for u in unknowns])

@@ -17,12 +17,13 @@ from upright.physics.regressor import regressor
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
 from upright.study.draft.chain_log import ChainLog
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised, swing_frequency
+from upright.study.draft.recognise import Recognised, in_dac_counts, swing_frequency
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -35,8 +36,6 @@ from upright.study.draft.tables import (
 )
 from upright.study.rig import per
 from upright.study.text import TomlTable
-
-SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
 
 REACH = 10.0
 """Volts that ECP's converter can put out; its log shows what the program asked for."""
@@ -107,7 +106,7 @@ def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
     c = log.recognised.columns[name]
     if c.guess == "counts":
         return 2 * np.pi / log.counts["rad"][0] if _unit(plant, name) == "rad" else 1 / log.counts["m"][0]
-    return SI.get(c.guess, 1.0)
+    return (ANGLES | LENGTHS).get(c.guess, 1.0)
 
 
 def _volts(c: Column) -> tuple[str, float]:
@@ -125,7 +124,7 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts
     if drive is not None:
         scale = _volts(drive)[1]
         u = record[drive.name][rows] * (-scale if log.recognised.reversed else scale)
-        reach = REACH if scale != 1.0 else np.inf
+        reach = REACH if drive.guess == "counts" or in_dac_counts(drive) else np.inf
     return starts(
         record.t[rows],
         u,
@@ -205,10 +204,10 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
 def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
     counts, whose = log.counts[coordinate.unit]
-    told = f"{whose}; what is said in V, s and counts does not depend on it"
+    sentence = f"{whose}; what is said in V, s and counts does not depend on it"
     driven = log.recognised.drive is not None
     return sensor_table(
-        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, told), driven=driven
+        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, sentence), driven=driven
     )
 
 

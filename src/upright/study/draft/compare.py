@@ -69,9 +69,9 @@ def sprung(rig: GreyBox, sample: Sample) -> GreyBox:
     w = 2 * math.pi / sample.period
     held = {p.unit: p.value for p in rig.parameters.values() if p.unit in SPRUNG.values() and p.value}
     left_out = [p for p in rig.parameters.values() if p.unit in SPRUNG and not p.estimate and not p.value]
-    found = {
+    springs = {
         p.name: replace(p, value=held[SPRUNG[p.unit]] * w**2, estimate=True, lower=0.0)
         for p in left_out
         if SPRUNG[p.unit] in held
     }
-    return replace(rig, parameters={**rig.parameters, **found})
+    return replace(rig, parameters={**rig.parameters, **springs})

@@ -140,11 +140,11 @@ def _answer(
 ) -> None:  # fmt: skip
     """Put what is known and asked in the place of what the draft guessed."""
     names = (*plant.names(), *ACTUATOR)
-    asked = [] if ask is None else list(ask)
-    for name in (*known, *asked):
+    estimated = [] if ask is None else list(ask)
+    for name in (*known, *estimated):
         if name not in names:
             raise BadInput(f"{plant.__name__} has no number '{name}'; {nearest(name, names)}")
-        if name in known and name in asked:
+        if name in known and name in estimated:
             raise BadInput(f"'{name}' cannot be known and asked at once; leave it out of one.")
 
     def table(name: str) -> tuple[dict[str, Any], str]:
@@ -155,7 +155,7 @@ def _answer(
     for name, value in known.items():
         where, key = table(name)
         where[key] = _text(value, plant, name)
-    starts = {n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or _guess(values, plant, n) for n in asked}
+    starts = {n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or _guess(values, plant, n) for n in estimated}
     for name in guesses if ask is not None else ():
         where, key = table(name)
         if name not in known:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from upright import units
 from upright.physics import Plant
 from upright.physics.statement import Coordinate
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.recognise import in_dac_counts
 from upright.study.text import TomlTable, Value
 
+PLACES = (*ANGLES, *LENGTHS)
+EFFORTS = ("V", "A", "N", "N m")
+"""Units of commands: a gain per mV would call a thousandth of it by the same number."""
 ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
 
 
@@ -42,8 +47,12 @@ def parameters_left_at_zero(table: TomlTable, plant: type[Plant], names: Iterabl
 
 
 def command_unit(c: Column) -> tuple[str, float]:
-    """Unit of a command and its factor on the column; the unit is empty when nobody says."""
-    return ("V", 1 / DAC_COUNTS_PER_VOLT) if in_dac_counts(c) else (c.unit or c.guess, 1.0)
+    """Unit of a command without a prefix, and its factor on the column; the unit is empty when nobody says."""
+    if in_dac_counts(c):
+        return "V", 1 / DAC_COUNTS_PER_VOLT
+    unit = c.unit or c.guess
+    whole = next((w for w in EFFORTS if units.known(unit) and units.same_dimension(unit, w)), "")
+    return (whole, units.scale(unit)) if whole else (unit, 1.0)
 
 
 def no_drive_table() -> TomlTable:
@@ -56,11 +65,12 @@ def no_drive_table() -> TomlTable:
 def drive_table(c: Column, unit: str, scale: float, *, reversed_: bool) -> TomlTable:
     """The command's column; `reversed_`: it first moves the driven body down."""
     table = TomlTable("[drive]")
-    raw = unit if scale == 1.0 else "DAC counts"
+    own = c.unit or c.guess
+    raw = unit if scale == 1.0 else "DAC counts" if own in ("", "counts") else own
     table.key("column", c.name, f"{c.low:.4g} to {c.high:.4g} {raw}".rstrip())
     table.key("unit", unit or "V", off=not unit)
     if scale != 1.0:
-        table.key("scale", scale, f"{DAC_COUNTS_PER_VOLT:g} counts per V")
+        table.key("scale", scale, f"{1 / scale:g} {raw} per {unit}")
     if reversed_:
         table.key("sign", -1, "the first command moves the column down")
     return table
@@ -83,9 +93,12 @@ def sensor_table(
         table.key("counts_per_rev" if turns else "counts_per_m", count, f"MEASURE: {counts[1]}")
     elif c.resolution.counts_per_rev and turns:
         table.key("counts_per_rev", {"value": c.resolution.counts_per_rev, "measured": True}, "from the column's steps")
-    elif c.resolution.step and c.guess in ("rad", "m"):
+    elif c.resolution.step and not c.resolution.decimals and c.guess in PLACES:
         step = {"value": f"{c.resolution.step:.4g} {c.guess}", "measured": True}
         table.key("resolution", step, "from the column's steps")
+    elif (most := c.resolution.step or c.resolution.hidden) and c.guess in PLACES:
+        why = "MEASURE: no encoder's steps are seen; digits or noise hide any up to that"
+        table.key("resolution", {"value": f"{most:.3g} {c.guess}", "assumed": True}, why)
     where = "lay before the first command" if driven else "comes to rest"
     zero = zero if abs(zero) > 1e-9 * (c.high - c.low) else 0.0  # a motion that has died out ends in rounding
     table.key("offset", zero, f"reading at which {name} is zero, here where it {where}")

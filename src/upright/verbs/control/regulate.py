@@ -108,7 +108,7 @@ def regulate(
 
     shared = Workers.of(workers)
     at, on = page_folder(out, pdf), known_options(HoldingOptions, on, "regulate")
-    wish = _wish("" if which == "" else str(which), poles, on, start, seconds, draws)
+    request = _request("" if which == "" else str(which), poles, on, start, seconds, draws)
     if source is None:
         make, seed = rig or "furuta", seed or 0
         progress("identifying the hanging twin", 0.0)
@@ -122,20 +122,20 @@ def regulate(
         known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="upright regulate"
     )
     truth = None if seed is None else twin_of(model, seed)
-    done = run_regulation(
+    result = run_regulation(
         model, None if truth is None else TwinStand(rig=truth), seed or 0, at,
-        lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
+        lambda step, share: progress(step, base + (1 - base) * share), request=request,
         source=name, workers=shared,
     )  # fmt: skip
-    told = chapter(done)
+    page = chapter(result)
     if source is not None:
-        told = replace(told, warnings=(*told.warnings, *doubts(known, model, truth)))
-    files = write_page(told, at / "report.html", pdf)
-    numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
-    return Answer(done, replace(told, numbers=numbers), files)
+        page = replace(page, warnings=(*page.warnings, *doubts(known, model, truth)))
+    files = write_page(page, at / "report.html", pdf)
+    numbers = {**page.numbers, "verdict": page.verdict, "report": str(files[0])}
+    return Answer(result, replace(page, numbers=numbers), files)
 
 
-def _wish(
+def _request(
     which: str, poles: str | Iterable[complex], on: HoldingOptions, start: Start, seconds: float, draws: int,
 ) -> RegulationRequest:  # fmt: skip
     from upright.experiments.regulation_2.run import SETS, RegulationRequest

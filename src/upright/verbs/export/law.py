@@ -75,7 +75,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
             warnings.append(f"Single precision may move a command by {miss}, {than}; a slower period moves it less.")
     else:
         warnings += filter(None, [target.warn(made, miss)])
-    told = Chapter(
+    page = Chapter(
         title=f"{made.title} for {target.name}", verdict=f"{name} is written for {target.name}; {exact}.",
         parts=(Part("What it takes and gives", (Points(tuple(made.facts)),)),), warnings=tuple(warnings),
         steps=(
@@ -86,4 +86,4 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
             "samples": len(test.readings), "single_precision_misses": test.single,
         },
     )  # fmt: skip
-    return Answer(tuple(str(f) for f in files), resting_on(told, made.basis), files)
+    return Answer(tuple(str(f) for f in files), resting_on(page, made.basis), files)

@@ -174,8 +174,8 @@ def place(model: Any, poles: Any) -> Gains:
     from upright.gains.requests import read_poles
 
     wanted = read_poles(poles) if isinstance(poles, str) else _complex(poles)
-    found = placed(model.A, model.B, wanted)
-    return Gains(K=found.K, poles=found.attained, S=None, model=model, sentence=found.sentence)
+    placement = placed(model.A, model.B, wanted)
+    return Gains(K=placement.K, poles=placement.attained, S=None, model=model, sentence=placement.sentence)
 
 
 @_model_first
@@ -403,12 +403,14 @@ def _row_of_gains(K: Any) -> Array:
         raise BadInput(f"K holds the gains of u = -K x, real numbers, one for each state, got {K!r:.40}.") from None
 
 
-def _weights(given: Any, size: int, name: str, of: str) -> Array:
+def _weights(weights: Any, size: int, name: str, of: str) -> Array:
     try:
-        w = np.asarray([float(x) for x in given.split(",")] if isinstance(given, str) else given, dtype=np.float64)
+        w = np.asarray(
+            [float(x) for x in weights.split(",")] if isinstance(weights, str) else weights, dtype=np.float64
+        )
     except (TypeError, ValueError):
         raise BadInput(
-            f"{name} takes numbers, one for each of the {size} {of}, or a matrix; got {given!r:.60}."
+            f"{name} takes numbers, one for each of the {size} {of}, or a matrix; got {weights!r:.60}."
         ) from None
     w = np.diag(np.atleast_1d(w)) if w.ndim < 2 else w
     if w.shape != (size, size):

@@ -71,7 +71,7 @@ class ResponseOptions(TypedDict, total=False):
         "low": "Least frequency, in rad/s.",
         "high": "Greatest frequency, in rad/s.",
     },
-    given=lambda typed: {**typed, "progress": silent} if typed["sources"] else typed,
+    prepare=lambda typed: {**typed, "progress": silent} if typed["sources"] else typed,
     more="""
     A log without --rig gives the response alone; fit.json goes to upright design.
 
@@ -125,29 +125,29 @@ def frequency(
     """
     from upright.rig.makes import MAKES
 
-    at, said = page_folder(out, pdf), known_options(ResponseOptions, of_log, "frequency")
-    kind = said.get("kind", "")
+    at, options = page_folder(out, pdf), known_options(ResponseOptions, of_log, "frequency")
+    kind = options.get("kind", "")
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
-    limits = _band(said.get("low"), said.get("high"))
+    limits = _band(options.get("low"), options.get("high"))
     files = [at / "frequency.csv"]
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
-        wish = LogRequest(
-            make=rig, command=said.get("command", ""), signals=pairs(said.get("signal"), "--signal"), kind=kind,
-            seed=seed, hold=si_if_given(said.get("hold"), "s"), band=limits,
-            counts={n: _count(n, v) for n, v in pairs(said.get("counts"), "--counts").items()},
-            known={n: _known(n, v, rig) for n, v in pairs(said.get("known"), "--known").items()},
+        request = LogRequest(
+            make=rig, command=options.get("command", ""), signals=pairs(options.get("signal"), "--signal"), kind=kind,
+            seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
+            counts={n: _count(n, v) for n, v in pairs(options.get("counts"), "--counts").items()},
+            known={n: _known(n, v, rig) for n, v in pairs(options.get("known"), "--known").items()},
         )  # fmt: skip
-        found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
-        files += [at / "fit.json"] if found.answer else []
-        told = log_chapter(found)
+        result = response_of_logs(logs, request, at, data=None if data is None else Path(data))
+        files += [at / "fit.json"] if result.answer else []
+        page = log_chapter(result)
     else:
-        for name in [*said, *(["data"] if data is not None else [])]:
+        for name in [*options, *(["data"] if data is not None else [])]:
             option = {"low": "from", "high": "to"}.get(name, name)
             raise BadInput(f"--{option} belongs to a log, and none was named; name one, or leave the option out.")
         if not rig:
@@ -161,12 +161,12 @@ def frequency(
         from upright.rig.makes import make_named
 
         make_named(rig)
-        found = run_frequency(rig, seed, at, progress, kind=ask)
+        result = run_frequency(rig, seed, at, progress, kind=ask)
         files += [at / "sweep.csv", at / "fit.json"]
-        told = simulated(chapter(found))
-    files += write_page(told, at / "report.html", pdf)
-    numbers = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
-    return Answer(found, replace(told, numbers=numbers), files)
+        page = simulated(chapter(result))
+    files += write_page(page, at / "report.html", pdf)
+    numbers = {"verdict": page.verdict, "sound": page.sound, **page.numbers, "files": [str(f) for f in files]}
+    return Answer(result, replace(page, numbers=numbers), files)
 
 
 def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
