@@ -70,20 +70,20 @@ def response_of(
     pieces = [piece for r in records for piece in sines_in(r.t, r[command])] if kind in ("", "sines") else []
     covered = sum(b - a for a, b, _ in pieces) / sum(len(r) for r in records)
     if kind == "sines" or (not kind and covered > 0.5):
-        found = _sines(records, command, outputs, quanta, hold)
+        response = _sines(records, command, outputs, quanta, hold)
     elif kind == "multisine" or (not kind and all(repetition(r[command]) is not None for r in records)):
-        found = multisine_response(records, command, outputs, quanta, hold)
+        response = multisine_response(records, command, outputs, quanta, hold)
     else:
-        found = _sweep(records, command, outputs, quanta, hold)
+        response = _sweep(records, command, outputs, quanta, hold)
     if band is not None:
-        kept = (found.omega >= band[0]) & (found.omega <= band[1])
-        if not kept.any():
+        inside = (response.omega >= band[0]) & (response.omega <= band[1])
+        if not inside.any():
             raise NotIdentifiable(
-                f"The log asks {found.omega[0]:.3g} to {found.omega[-1]:.3g} rad/s, nothing between {band[0]:g} and "
-                f"{band[1]:g}."
+                f"The log asks {response.omega[0]:.3g} to {response.omega[-1]:.3g} rad/s, nothing between {band[0]:g} "
+                f"and {band[1]:g}."
             )
-        found = found.only(kept)
-    return found
+        response = response.only(inside)
+    return response
 
 
 def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
@@ -113,7 +113,7 @@ def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
 def _sines(
     records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
 ) -> FrequencyResponse:
-    found: list[tuple[float, Tone, Tone]] = []
+    tones: list[tuple[float, Tone, Tone]] = []
     notes: list[str] = []
     for r in records:
         y = np.column_stack([r[n] for n in outputs])
@@ -129,21 +129,21 @@ def _sines(
                 begin = len(lines) // 2
             first = edges[min(begin, max(0, len(edges) - 3))]
             part = slice(int(first), int(edges[-1]))
-            found.append((
+            tones.append((
                 omega, detect(r.t[part], y[part], omega, resolution=quanta), detect(r.t[part], r[command][part], omega),
             ))  # fmt: skip
-    if not found:
+    if not tones:
         raise NotIdentifiable("The command holds no sine of three periods; try --kind sweep.")
-    found.sort(key=lambda f: f[0])
-    kept = [found[0]]
-    for f in found[1:]:
-        if f[0] > kept[-1][0] * (1 + 1e-4):
-            kept.append(f)
-        elif float(f[1].variance.sum()) < float(kept[-1][1].variance.sum()):
-            kept[-1] = f
+    tones.sort(key=lambda f: f[0])
+    distinct = [tones[0]]
+    for f in tones[1:]:
+        if f[0] > distinct[-1][0] * (1 + 1e-4):
+            distinct.append(f)
+        elif float(f[1].variance.sum()) < float(distinct[-1][1].variance.sum()):
+            distinct[-1] = f
     return from_tones(
-        [x for _, x, _ in kept], [c for _, _, c in kept], outputs=outputs, units=_units(records[0], outputs, command),
-        command=command, hold=hold, notes=notes,
+        [x for _, x, _ in distinct], [c for _, _, c in distinct], outputs=outputs,
+        units=_units(records[0], outputs, command), command=command, hold=hold, notes=notes,
     )  # fmt: skip
 
 
@@ -200,10 +200,10 @@ def _sweep(
     U, Y = np.array(inputs), np.array(answers)
     omega = np.asarray(2 * math.pi * np.fft.rfftfreq(length, records[0].period), dtype=np.float64)
     power = np.sum(np.abs(U) ** 2, axis=0)
-    asked = (np.sqrt(power) > WEAK * np.sqrt(power.max())) & (omega > 1.5 * omega[1])
-    if U.shape[0] < 3 or asked.sum() < 3:
+    excited = (np.sqrt(power) > WEAK * np.sqrt(power.max())) & (omega > 1.5 * omega[1])
+    if U.shape[0] < 3 or excited.sum() < 3:
         raise NotIdentifiable(
-            f"A sweep needs three windows or repeats and three frequencies, got {U.shape[0]} and {int(asked.sum())}; "
+            f"A sweep needs three windows or repeats and three frequencies, got {U.shape[0]} and {int(excited.sum())}; "
             "give the repeats together, or a longer log."
         )
     cross = np.sum(Y * np.conj(U)[:, :, None], axis=0)
@@ -216,7 +216,7 @@ def _sweep(
     G = cross / np.maximum(power[:, None], 1e-300)
     unexplained = np.clip(1 - coherence, 0, None) / np.maximum(coherence, 1e-12)
     variance = np.abs(G) ** 2 * unexplained / np.maximum(count - 1, 0.5)[:, None]
-    at = _thinned(np.flatnonzero(asked), omega)
+    at = _thinned(np.flatnonzero(excited), omega)
     drive = np.array([levels[int(np.argmax(np.abs(U[:, k])))] for k in at])
     variance = variance[at] + quanta**2 / 3 / length / drive[:, None] ** 2
     return FrequencyResponse(

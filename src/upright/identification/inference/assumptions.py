@@ -46,24 +46,24 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
     assumed = [p for p in problem.rig.parameters.values() if p.assumed]
     if not assumed:
         return ()
-    asked = [
+    places = [
         i for i, u in enumerate(problem.unknowns) if u.shared and u.estimated and not best.pinned[i] and value[i] != 0
     ]
-    unknowns = [problem.unknowns[i] for i in asked]
-    moves, sizes = _moves(best, assumed, asked) if evaluate else (None, None)
-    found: list[Assumption] = []
+    unknowns = [problem.unknowns[i] for i in places]
+    moves, sizes = _moves(best, assumed, places) if evaluate else (None, None)
+    out: list[Assumption] = []
     for k, p in enumerate(assumed):
-        shifts = [math.nan] * len(asked) if moves is None else moves[:, k].tolist()
+        shifts = [math.nan] * len(places) if moves is None else moves[:, k].tolist()
         size = abs(p.value) if sizes is None else float(sizes[k])
         follows = {u.name: float(m) for u, m in zip(unknowns, shifts, strict=True)}
-        found.append(
+        out.append(
             Assumption(
                 name=p.name, value=p.value, unit=p.unit, follows=follows, size=size,
                 redefines=tuple(n for n in REDEFINES.get(p.name, ()) if p.value == 0 and n in follows),
                 without=_without(p, follows, estimates, problem), range=_range(p, size),
             )
         )  # fmt: skip
-    return tuple(replace(a, ratios=_ratios(a, found, estimates)) for a in found)
+    return tuple(replace(a, ratios=_ratios(a, out, estimates)) for a in out)
 
 
 def _range(p: Parameter, size: float) -> tuple[float, float]:
@@ -125,7 +125,7 @@ def _per(above: str, below: str) -> str:
     return f"{above} per {below}"
 
 
-def _moves(best: Optimum, assumed: Sequence[Parameter], asked: Sequence[int]) -> tuple[Array | None, Array]:
+def _moves(best: Optimum, assumed: Sequence[Parameter], places: Sequence[int]) -> tuple[Array | None, Array]:
     """Relative change (asked, assumed) of each estimate per relative change of an assumed number, and their sizes."""
     problem, x, value = best.problem, best.x, best.values
     names = {p.name for p in assumed}
@@ -145,14 +145,14 @@ def _moves(best: Optimum, assumed: Sequence[Parameter], asked: Sequence[int]) ->
     free = np.flatnonzero(~best.pinned)
     slopes = np.zeros((x.size, len(extra)))
     slopes[free] = -pseudo_inverse(A[np.ix_(free, free)]) @ A[np.ix_(free, np.arange(x.size, z.size))]
-    per_relative = np.array([1.0 if problem.unknowns[i].log else float(value[i]) for i in asked])
+    per_relative = np.array([1.0 if problem.unknowns[i].log else float(value[i]) for i in places])
     effects = np.sqrt(np.maximum(np.diag(A), 0.0))
-    most = float(np.max(effects[list(asked)] * np.abs(per_relative), initial=0.0))
+    most = float(np.max(effects[list(places)] * np.abs(per_relative), initial=0.0))
     zero = sizes == 0
     sizes[zero] = most / np.maximum(effects[x.size :][zero], 1e-300)
     change = np.array([1.0 if u.log else size * math.copysign(1.0, u.value)
                        for u, size in zip(extra, sizes, strict=True)])  # fmt: skip
-    return slopes[list(asked)] * change / per_relative[:, None], sizes
+    return slopes[list(places)] * change / per_relative[:, None], sizes
 
 
 def proportional(a: Assumption) -> list[str]:
@@ -189,10 +189,10 @@ def _resting(e: Estimate, names: Sequence[str]) -> str:
     return f"rests on {', '.join(names)}" if names and e.status == "well determined" else e.status
 
 
-def assumption_sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
+def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
     """What rests on which assumed number, and what would make it known."""
     said: list[str] = []
-    for a in found:
+    for a in rested:
         along, free, moved = proportional(a), untouched(a), resting(a)
         unit = "" if a.unit in ("", "1") else f" {a.unit}"
         low, high = a.range
@@ -208,8 +208,8 @@ def assumption_sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
                 verb = "is" if len(along) == 1 else "are"
                 parts.append(f"{', '.join(along)} {verb} proportional to it, so their ratios are known")
             if other and a.value != 0:
-                told = ", ".join(f"{n} by {e:+.2g} %" for n, e in other.items())
-                parts.append(f"for every percent of it {told} would follow")
+                shifts = ", ".join(f"{n} by {e:+.2g} %" for n, e in other.items())
+                parts.append(f"for every percent of it {shifts} would follow")
             elif other:
                 parts.append(f"{', '.join(other)} would move with it")
             if a.redefines:
