@@ -273,3 +273,15 @@ def test_pictures_of_the_reasons_are_of_the_fitted_model():
     for law in (SET_1, SET_4, PD, STIFF):
         assert ends[law.name] == [[law.stiffness, max(law.decay, 0.0)]]
     assert bargain.get_xlabel() == "static force per error [N m/rad]"
+
+
+def test_a_set_that_bangs_at_rest_is_named_and_not_sound():
+    """A tenth of the limit is quiet; three tenths are the largest disturbance of their own rig."""
+    busy = whole(last={"rms": 0.3})
+    told = chapter(busy)
+    assert "At rest the effort is excessive: the command's rms is 30 % of the limit with set 4 (10 % is quiet)." in (
+        told.verdict
+    )
+    assert not told.sound
+    assert chapter(whole(last={"rms": 0.1})).sound
+    assert "excessive" not in chapter(whole(last={"rms": 0.1})).verdict
