@@ -51,7 +51,6 @@ def checked(rig, make):
     return scales(make_rig(make), shown_by_encoders(rig, command(make)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("make", MAKES)
 @pytest.mark.parametrize("shown", [(1.0, -1.0), (-1.0, 1.0), (1.0, 0.5), (4.0, 1.0), (1.1, 0.9)])
 def test_what_an_encoder_shows_over_what_is_true_is_found_hanging(make, shown):
@@ -218,7 +217,6 @@ def test_sound_sensors_are_seldom_suspected():
     assert math.log(ODDS) > math.log(c)
 
 
-@pytest.mark.slow
 def test_a_watched_drive_stops_pushing():
     """The same run up to the alarm, no command after it, and then no more energy than a falling pendulum has."""
     watch, law = loop("linear")

@@ -144,8 +144,8 @@ class SerialRig:
 
     def _greet(self, every: int) -> wire.Hello:
         """What the firmware says of itself when it is told how many ticks there are between two exchanges."""
-        asked = wire.greeting(every, nonce := self._nonce())
-        hello = self._hello = wire.hello(self._ask(Kind.HELLO, asked, max(_BOOT, self._patience)))
+        greeting = wire.greeting(every, nonce := self._nonce())
+        hello = self._hello = wire.hello(self._ask(Kind.HELLO, greeting, max(_BOOT, self._patience)))
         if hello.protocol == wire.PROTOCOL and hello.nonce != nonce:
             raise RigStopped(f"{self._name()} answers another program; end that first.")
         self._tick = 1e-6 * hello.period

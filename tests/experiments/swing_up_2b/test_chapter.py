@@ -15,8 +15,8 @@ UP = "with at most 8 of 10 V and 0.6 of 1.5 rad of travel"
 
 def lie(**what):
     rest = {
-        "name": "theta", "factor": -0.5, "found": 0.49987, "error": 0.001, "refused": True, "spoke": 0.0123,
-        "tilt": math.radians(7.5), "said": "theta", "fell": 0.2345,
+        "name": "theta", "factor": -0.5, "estimate": 0.49987, "error": 0.001, "refused": True, "spoke": 0.0123,
+        "tilt": math.radians(7.5), "suspicion": "theta", "fell": 0.2345,
     }  # fmt: skip
     return Lie(**(rest | what))
 
@@ -103,7 +103,7 @@ def test_lies_are_counted_by_who_notices_them_and_when():
     """Of four lies three are found hanging; two fall, and a watch speaks before one of them."""
     lies = (
         lie(), lie(factor=4.0, spoke=0.5, fell=0.3),
-        lie(refused=False, spoke=math.inf, tilt=0.0, said="", fell=math.inf),
+        lie(refused=False, spoke=math.inf, tilt=0.0, suspicion="", fell=math.inf),
         lie(fell=math.inf),
     )  # fmt: skip
     told = chapter(experiment(climbed(), lies=lies))

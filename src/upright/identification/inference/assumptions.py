@@ -41,27 +41,27 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
     assumed = [p for p in problem.rig.parameters.values() if p.assumed]
     if not assumed:
         return ()
-    asked = [
+    places = [
         i for i, u in enumerate(problem.unknowns) if u.shared and u.estimated and not best.pinned[i] and value[i] != 0
     ]
-    unknowns = [problem.unknowns[i] for i in asked]
-    moves, sizes = _moves(best, assumed, asked) if evaluate else (None, None)
-    found: list[Assumption] = []
+    unknowns = [problem.unknowns[i] for i in places]
+    moves, sizes = _moves(best, assumed, places) if evaluate else (None, None)
+    out: list[Assumption] = []
     for k, p in enumerate(assumed):
-        shifts = [math.nan] * len(asked) if moves is None else moves[:, k].tolist()
+        shifts = [math.nan] * len(places) if moves is None else moves[:, k].tolist()
         size = abs(p.value) if sizes is None else float(sizes[k])
         follows = {u.name: float(m) for u, m in zip(unknowns, shifts, strict=True)}
-        found.append(
+        out.append(
             Assumption(
                 name=p.name, value=p.value, unit=p.unit, follows=follows, size=size,
                 redefines=tuple(n for n in REDEFINES.get(p.name, ()) if p.value == 0 and n in follows),
                 without=_without(p, follows, estimates, problem),
             )
         )  # fmt: skip
-    return tuple(found)
+    return tuple(out)
 
 
-def _moves(best: Optimum, assumed: Sequence[Parameter], asked: Sequence[int]) -> tuple[Array | None, Array]:
+def _moves(best: Optimum, assumed: Sequence[Parameter], places: Sequence[int]) -> tuple[Array | None, Array]:
     """Relative change (asked, assumed) of each estimate per relative change of an assumed number, and their sizes."""
     problem, x, value = best.problem, best.x, best.values
     names = {p.name for p in assumed}
@@ -81,14 +81,14 @@ def _moves(best: Optimum, assumed: Sequence[Parameter], asked: Sequence[int]) ->
     free = np.flatnonzero(~best.pinned)
     slopes = np.zeros((x.size, len(extra)))
     slopes[free] = -pseudo_inverse(A[np.ix_(free, free)]) @ A[np.ix_(free, np.arange(x.size, z.size))]
-    per_relative = np.array([1.0 if problem.unknowns[i].log else float(value[i]) for i in asked])
+    per_relative = np.array([1.0 if problem.unknowns[i].log else float(value[i]) for i in places])
     effects = np.sqrt(np.maximum(np.diag(A), 0.0))
-    most = float(np.max(effects[list(asked)] * np.abs(per_relative), initial=0.0))
+    most = float(np.max(effects[list(places)] * np.abs(per_relative), initial=0.0))
     zero = sizes == 0
     sizes[zero] = most / np.maximum(effects[x.size :][zero], 1e-300)
     change = np.array([1.0 if u.log else size * math.copysign(1.0, u.value)
                        for u, size in zip(extra, sizes, strict=True)])  # fmt: skip
-    return slopes[list(asked)] * change / per_relative[:, None], sizes
+    return slopes[list(places)] * change / per_relative[:, None], sizes
 
 
 def proportional(a: Assumption) -> list[str]:
@@ -107,17 +107,17 @@ def resting(a: Assumption) -> list[str]:
     return [n for n in a.follows if n not in free]
 
 
-def with_assumptions(estimates: Mapping[str, Estimate], found: Sequence[Assumption]) -> dict[str, Estimate]:
+def with_assumptions(estimates: Mapping[str, Estimate], rested: Sequence[Assumption]) -> dict[str, Estimate]:
     """The estimates, each with the assumed numbers that it rests on."""
     return {
-        n: replace(e, rests_on=tuple(a.name for a in found if n in resting(a))) for n, e in estimates.items()
+        n: replace(e, rests_on=tuple(a.name for a in rested if n in resting(a))) for n, e in estimates.items()
     }  # fmt: skip
 
 
-def assumption_sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
+def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
     """What rests on which assumed number, and what would make it known."""
-    said: list[str] = []
-    for a in found:
+    sentences: list[str] = []
+    for a in rested:
         along, firm, moved = proportional(a), untouched(a), resting(a)
         unit = "" if a.unit in ("", "1") else f" {a.unit}"
         parts = [f"{a.name} = {a.value:g}{unit} is assumed, not known"]
@@ -130,16 +130,16 @@ def assumption_sentences(found: Sequence[Assumption]) -> tuple[str, ...]:
                     f"{', '.join(along)} {'is' if len(along) == 1 else 'are'} proportional to it, ratios are firm"
                 )
             if other and a.value != 0:
-                told = ", ".join(f"{n} by {e:+.2g} %" for n, e in other.items())
-                parts.append(f"for every percent of it {told} would follow")
+                shifts = ", ".join(f"{n} by {e:+.2g} %" for n, e in other.items())
+                parts.append(f"for every percent of it {shifts} would follow")
             elif other:
                 parts.append(f"{', '.join(other)} would move with it")
             if a.redefines:
                 parts.append(f"{', '.join(a.redefines)} takes what it would explain into its own value")
             if firm:
                 parts.append(f"{', '.join(firm)} {'does' if len(firm) == 1 else 'do'} not depend on it")
-        said.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
-    return tuple(said)
+        sentences.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
+    return tuple(sentences)
 
 
 def remedy(a: Assumption) -> str:

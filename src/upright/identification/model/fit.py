@@ -212,9 +212,9 @@ class Fit:
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""
-        found = {n: e.value for n, e in self.estimates.items()}
-        found |= {f"{label}: {n}": e.value for label, own in self.per_run.items() for n, e in own.items()}
-        return found | {f"group {g}: {n}": e.value for g, own in self.groups.items() for n, e in own.items()}
+        values = {n: e.value for n, e in self.estimates.items()}
+        values |= {f"{label}: {n}": e.value for label, own in self.per_run.items() for n, e in own.items()}
+        return values | {f"group {g}: {n}": e.value for g, own in self.groups.items() for n, e in own.items()}
 
 
 def to_lmfit(fit: Fit) -> Any:

@@ -153,12 +153,12 @@ INITIAL_SPREAD = (0.02, 0.1)
 
 def run_unknowns(rig: GreyBox, index: int, run: Run, start: State) -> list[Unknown]:
     """What is sought for one run alone; `start` is its measured first state and its uncertainty."""
-    found: list[Unknown] = []
+    unknowns: list[Unknown] = []
     wanted = {*run.unknown, *run.shared}
 
     def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None,
             lower: float = -math.inf, upper: float = math.inf, *, log: bool = False) -> None:  # fmt: skip
-        found.append(
+        unknowns.append(
             Unknown(name=name, runs=(index,), value=value, lower=lower, upper=upper, log=log, scale=scale,
                     prior=prior, group=run.shared.get(name, ""))
         )  # fmt: skip
@@ -202,17 +202,17 @@ def run_unknowns(rig: GreyBox, index: int, run: Run, start: State) -> list[Unkno
                 # where the command plainly acted as logged, a trip would only excuse wrong parameters
                 near = NEAR * MOMENT if name in run.guesses and abs(guess - logged) < dt else math.inf
                 add(name, guess, MOMENT, lower=max(first, guess - near), upper=min(last, guess + near))
-    return found
+    return unknowns
 
 
 def _commanded(run: Run) -> NDArray[np.bool_]:
     """Samples (N,) at which something is asked of the drive; by a loop, from the first change of its reference on."""
-    asked = np.asarray(run.u.any(axis=1), dtype=bool)
+    commanded = np.asarray(run.u.any(axis=1), dtype=bool)
     if run.loop is not None:
         r = run.loop.law.signal()[: run.t.size]
         changed = np.flatnonzero((r != r[:1]).any(axis=1))
-        asked[int(changed[0]) if changed.size else 0 :] = True
-    return asked
+        commanded[int(changed[0]) if changed.size else 0 :] = True
+    return commanded
 
 
 @dataclass(frozen=True, kw_only=True)
