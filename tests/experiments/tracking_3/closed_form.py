@@ -54,7 +54,8 @@ def ran(
     seen = StepFigures(**(FIGURES | figures)) if moved and math.isinf(tripped) else None
     return StepTrial(
         trial=motion(), figures=seen, effort=Effort(peak=peak, share=share, saturated=saturated),
-        rest=RestEffort(rms=rms, peak=2 * rms) if math.isinf(tripped) else None, twist=0.11, travel=0.22, give=give, tripped=tripped,
+        rest=RestEffort(rms=rms, peak=2 * rms) if math.isinf(tripped) else None, twist=0.11, travel=0.22, give=give,
+        tripped=tripped,
     )  # fmt: skip
 
 
