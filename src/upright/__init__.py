@@ -23,7 +23,7 @@ Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; every verb takes it
 Control     StateSpace, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design, export,
-            regulate, swing_up, track; Law, Rule
+            regulate, swing_up, track, play; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
 ==========  ==================================================================================================
@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from upright.systems import StateSpace
     from upright.verbs.control.chance import chance
     from upright.verbs.control.design import design
+    from upright.verbs.control.play import play
     from upright.verbs.control.regulate import regulate
     from upright.verbs.control.swing_up import swing_up
     from upright.verbs.control.track import track
@@ -102,6 +103,7 @@ _HOMES = {
     "rig": ("Rig",),
     "verbs.control.chance": ("chance",),
     "verbs.control.design": ("design",),
+    "verbs.control.play": ("play",),
     "verbs.control.regulate": ("regulate",),
     "verbs.control.swing_up": ("swing_up",),
     "verbs.control.track": ("track",),
@@ -129,8 +131,9 @@ __all__ = [
     "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export",
     "firmware_build", "firmware_flash", "firmware_pins", "frequency", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
-    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "predict", "prefilter", "quantity", "read",
-    "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
+    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "play", "predict", "prefilter", "quantity",
+    "read", "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up",
+    "track",
 ]  # fmt: skip
 
 

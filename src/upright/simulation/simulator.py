@@ -289,6 +289,16 @@ class Simulator:
         """Place of each number of a lane in the working array: ``W[place * width + lane]``."""
         return self._layout.rows
 
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Names of those of `rows` that stay as they are while a motion lasts."""
+        return self._layout.settings
+
+    @property
+    def law_rows(self) -> tuple[str, ...]:
+        """Names of the numbers of the controller, which follow `names` in the kernel's table of parameters."""
+        return self._layout.numbers
+
     def call(
         self,
         params: Array,

@@ -178,6 +178,15 @@ class Layout:
         return (*names, *(f"z{i}" for i in z), *(f"tg{i}" for i in range(self.n)))
 
     @cached_property
+    def settings(self) -> tuple[str, ...]:
+        """Names of `rows` that stay as they are while a motion lasts: numbers of plant, drive and controller."""
+        drive = ("gain", "off", "lim", *["gd"] * self.flavour.droop, *["e", "ep", "th", "df"] * self.flavour.dynamic)
+        names = {f"{c}{j}" for c in drive for j in range(self.nu)} | {"di"} | set(self.constants)
+        law = self.flavour.loop
+        memory = {f"z{i}" for i in range(len(law.A))} if isinstance(law, Structure) else set[str]()
+        return tuple(n for n in self.rows if n in names or (n in self.numbers and n not in memory))
+
+    @cached_property
     def carried(self) -> tuple[str, ...]:
         """Numbers that go in and out behind the states: deflections of joints, braking as it has built up."""
         f = self.flavour
