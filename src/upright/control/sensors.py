@@ -8,7 +8,7 @@ the sign of the drive that of both. How the driven body drifts meanwhile says no
 offset and dry friction all make it.
 
 In the running loop each suspicion, such as "theta shows twice what is true", is a model with a Kalman filter of its
-own. At every sample each filter is asked how likely the new reading is; the logarithms of the ratios add up and slowly
+own. At every sample each filter gives the likelihood of the new reading; the logarithms of the ratios add up and slowly
 fade (Wald's sequential test of several hypotheses, with a memory). Where a suspicion has become `ODDS` times as likely
 as sound sensors, something is wrong. What it is shows a little later, since two sensors seen only beside each other
 cannot tell which of them is wrong: the drive is switched off once one suspicion leads the others, or the pendulum
@@ -234,7 +234,8 @@ def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: 
 def lifted(rig: Rig, shown: float) -> str:
     """What a hand that lifted the pendulum upright learns from its reading [rad]; "" when it is half a turn.
 
-    The encoder was zeroed where the pendulum hangs. A sign cannot be told, since half a turn either way is upright.
+    The encoder was zeroed where the pendulum hangs. A sign cannot be determined, since half a turn either way is
+    upright.
     """
     off = abs(abs(shown) - math.pi)
     if off <= math.radians(10):

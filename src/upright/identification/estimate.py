@@ -75,14 +75,14 @@ def identify(
     Parameters
     ----------
     rig : GreyBox
-        Plant, what is known and what is asked.
+        Plant, what is known and what is to be estimated.
     runs : sequence of Run
         Those with role ``"fit"`` are explained together; those with role ``"predict"`` are only scored, with the
         parameters fixed.
     method : {"auto", "least-squares", "simplex"}
         See `METHODS`.
     progress : callable, optional
-        Told the stage, its cost and its number of simulations, and the share done.
+        Called with the stage, its cost and number of simulations, and the share completed.
     watch : bool
         Whether stretches that something else than the input moved are named, and left out in a second fit.
     near : Fit, optional
@@ -97,7 +97,7 @@ def identify(
     Raises
     ------
     BadInput
-        When no run may be fitted, nothing is asked, or a name does not exist.
+        When no run may be fitted, nothing is to be estimated, or a name does not exist.
     """
     return _identify(rig, runs, method, progress, watch=watch, near=near)
 
@@ -106,7 +106,7 @@ def _identify(
     rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
     conventions: Callable[[], Sequence[str]] | None = None,
 ) -> Fit:  # fmt: skip
-    """As `identify`; a fit without outliers is told what the `conventions` of all samples look like."""
+    """As `identify`; a fit without outliers knows the `conventions` of all samples."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
     fitted = [with_trip_guesses(rig, run) for run in runs if run.role == "fit"]

@@ -99,7 +99,7 @@ class Oscillator:
     step : float
         Command of a step [V].
     piece : float
-        Inertia that one of the 500 g masses is said to add [kg or kg m^2].
+        Inertia that one of the 500 g masses adds nominally [kg or kg m^2].
     tolerance : float
         Relative standard uncertainty of that.
     """
@@ -153,7 +153,7 @@ OSCILLATORS = {
 class Mounted:
     """What the later experiments add to the body that experiment 1a weighed: 500 g masses, and what a drawing tells.
 
-    `each` is the inertia that one mass is said to add, `rest` that of all else, `rest_error` its standard error
+    `each` is the nominal inertia of one mass, `rest` that of all else, `rest_error` its standard error
     [kg or kg m^2]; `bare` says how the body is freed to be weighed, `later` begins a sentence on how it is used.
     """
 
@@ -189,10 +189,10 @@ class Make:
     body, oscillator, mounted : str, Oscillator, Mounted
         1a: inertia that is weighed, the body on its spring, what the later experiments add to it.
     band : (float, float)
-        1b: frequencies asked [rad/s]; below, dry friction holds the rig; above, it hardly moves.
+        1b: excited frequencies [rad/s]; below, dry friction holds the rig; above, it hardly moves.
     reach, fastest : tuple of float
-        1b: amplitude asked of each coordinate [m or rad], the pendulum nearly linear, carts clear of their stops; and
-        the speed it may not exceed: an arm whose mean square speed comes near g/l flings its hanging pendulum out.
+        1b: requested amplitude of each coordinate [m or rad], the pendulum nearly linear, carts clear of their stops;
+        and the speed it may not exceed: an arm whose mean square speed comes near g/l flings its hanging pendulum out.
     bench : mapping of str to float
         1b: what is weighed, balanced on an edge or ruled, and how well (relative standard deviation).
     sought : tuple of str

@@ -1,4 +1,4 @@
-"""Does the driven body's encoder show what its drive does? Asked of the command and of the pendulum it carries.
+"""Does the driven body's encoder show what its drive does? Tested by the command and by the pendulum it carries.
 
 A loop stands for a while without that encoder, or against it, and the arm runs away under it: what a bank of filters
 about an equilibrium sees last. Two witnesses say how the body must have moved. The command does, as far as dry friction

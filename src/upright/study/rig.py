@@ -1,4 +1,4 @@
-"""What is known about the rig, and what is asked? [rig], [parameters] and [actuator] of a study."""
+"""Known and estimated numbers of the rig: [rig], [parameters] and [actuator] of a study."""
 
 from __future__ import annotations
 

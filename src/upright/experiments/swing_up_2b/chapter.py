@@ -1,4 +1,4 @@
-"""Experiment 2b as a chapter: the encoders, the way up, and what lying encoders would have done."""
+"""Experiment 2b as a chapter: the encoders, the way up, and what faulty encoders would have done."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _swing_part(result: SwingUpRun, run: Ascent) -> Part:
 
 
 def _lie_part(result: SwingUpRun) -> Part:
-    """Lying encoders, tried one by one."""
+    """Faulty encoders, tried one by one."""
     rows = tuple(_row(lie) for lie in result.lies)
     caught = sum(lie.refused for lie in result.lies)
     falling = [lie for lie in result.lies if math.isfinite(lie.fell)]

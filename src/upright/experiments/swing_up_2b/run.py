@@ -1,4 +1,4 @@
-"""Experiment 2b, from hanging to upright: encoders first, then pump, catch and hold; and what lying encoders do.
+"""Experiment 2b, from hanging to upright: encoders first, then pump, catch and hold; and what faulty encoders do.
 
 The law is designed from what is known of the rig, a fit or the make's data sheet; it runs on the rig itself, here the
 twin's truth.
@@ -33,7 +33,7 @@ HELD = 5.0
 """How long the pendulum must stand before it counts as caught [s]."""
 SECONDS = 12.0
 TILT = math.radians(3)
-"""From which a loop with a lying encoder is switched on [rad]."""
+"""From which a loop with a faulty encoder is switched on [rad]."""
 LEAST = math.radians(40)
 """Swing below which the period tells too little of the amplitude [rad]: at 40 degrees it is 3 % longer."""
 LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("theta", 1.1), ("", -1.0), ("", 4.0))
@@ -42,7 +42,7 @@ LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("thet
 
 @dataclass(frozen=True, kw_only=True)
 class Lie:
-    """What becomes of one lying encoder.
+    """What becomes of one faulty encoder.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Lie:
         When the watch of a running loop would have switched off [s]; inf when it would not.
     tilt : float
         True deviation from upright then [rad]; 0 when it would not.
-    said : str
+    suspicion : str
         What the watch took it for.
     fell : float
         When the loop fell without a watch [s]; inf when it stood.
@@ -233,7 +233,7 @@ def run_swing_up(
     travel: float | None = None,
     source: str = "",
 ) -> SwingUpRun:
-    """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would do to a twin.
+    """Check the encoders of a hanging rig, swing it up and hold it; then try what faulty encoders would do to a twin.
 
     Parameters
     ----------
@@ -244,9 +244,9 @@ def run_swing_up(
     folder : Path
         Takes ``sensors.csv`` and ``swing_up.csv``.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
-        Asked before the lies whether to leave them out.
+        Called before the faulty encoders: whether to leave them out.
     known : mapping of str to float, optional
         How well the model's numbers are known, see `known_of`; `sensors.KNOWN` when omitted.
     seconds : float

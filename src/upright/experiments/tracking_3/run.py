@@ -94,7 +94,7 @@ class Outcome:
 
     @property
     def tried(self) -> bool:
-        """Whether the rig was stepped with it; else what is measured is what is foreseen."""
+        """Whether the rig was stepped with it; else the measured figures are the predicted ones."""
         return self.measured is not self.predicted
 
     @property
@@ -172,7 +172,7 @@ class Tracking:
 
     @property
     def tried(self) -> bool:
-        """Whether anything was tried, beside what the model foresees."""
+        """Whether anything was tried, beside what the model predicts."""
         return any(o.tried for o in self.outcomes)
 
     @property
@@ -198,7 +198,7 @@ def run_tracking(
     folder : Path
         Takes logs, study and fit.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
         Asked between trials whether to stop there.
     which : sequence of int
@@ -244,7 +244,7 @@ def track_on(
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None,
 ) -> Tracking:  # fmt: skip
-    """Design on the model and try on the rig; without a rig only what the model foresees is told. See `run_tracking`.
+    """Design on the model and try on the rig; without a rig only the prediction is reported. See `run_tracking`.
 
     Pole sets of Table 2 are for the makers' rigs; those of one's own are as much faster as the shaft swings faster.
 
@@ -315,7 +315,7 @@ def _times_as_fast(model: Rig) -> float:
 
 
 def _tried(stand: TestStand, law: Tracker, expected: StepTrial, step: float, folder: Path) -> StepTrial | None:
-    """The law on the rig; None where it is foreseen to leave a live rig's bounds."""
+    """The law on the rig; None where it is predicted to leave a live rig's bounds."""
     safe = math.isinf(expected.tripped) and law.decay > 0 and not expected.effort.saturated
     if not stand.simulated and not safe:
         return None

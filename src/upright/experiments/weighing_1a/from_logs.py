@@ -1,4 +1,4 @@
-"""Experiment 1a on logs of a rig of one's own, or on those of a twin: what was added is told log by log."""
+"""Experiment 1a on logs of a rig of one's own, or on those of a twin: what was added is named log by log."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def weigh_logs(
     Raises
     ------
     BadInput
-        When logs and loadings do not match, or a column is not told.
+        When logs and loadings do not match, or a column is not named.
     NotIdentifiable
         When too few swings can be seen.
     """

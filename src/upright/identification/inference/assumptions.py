@@ -1,8 +1,8 @@
 """Assumed numbers: what rests on each, and what the data say without it.
 
 A log in volts and counts fixes inertia per gain, not inertia. Take the gain as 1 and say so
-(``gain = { value = "1 N m/V", assumed = true }``): what is proportional to it is told in volts, seconds and counts as
-well, and what does not feel it (frequencies, damping ratios, speeds) is firm.
+(``gain = { value = "1 N m/V", assumed = true }``): what is proportional to it is reported in volts, seconds and counts
+as well, and what does not feel it (frequencies, damping ratios, speeds) is firm.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
 
 
 def _moves(best: Optimum, assumed: Sequence[Parameter], places: Sequence[int]) -> tuple[Array | None, Array]:
-    """Relative change (asked, assumed) of each estimate per relative change of an assumed number, and their sizes."""
+    """Relative change (estimated, assumed) of each estimate per relative change of an assumed number, and sizes."""
     problem, x, value = best.problem, best.x, best.values
     names = {p.name for p in assumed}
     loose = {
@@ -153,7 +153,7 @@ def remedy(a: Assumption) -> str:
 def _without(
     assumed: Parameter, follows: Mapping[str, float], estimates: Mapping[str, Estimate], problem: Problem
 ) -> dict[str, Estimate]:
-    """Estimates per assumed gain, in units of the command, seconds, and counts where every encoder has one quantum."""
+    """Estimates per assumed gain, in units of the command, seconds, and counts if all encoders have one resolution."""
     if assumed.name != "actuator.gain":
         return {}
     force, _, command = assumed.unit.partition("/")

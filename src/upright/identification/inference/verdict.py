@@ -1,6 +1,6 @@
 """The verdict in three answers: does the model predict, which of its numbers can be used, and is it enough for a loop?
 
-None is better than its reasons. What was not tested is said to be not tested.
+None is better than its reasons. What was not tested is reported as not tested.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A fit as a chapter: what was asked, how the runs are followed, which numbers came out and what they are worth."""
+"""A fit as a chapter: the question, how the runs are followed, which numbers came out and what they are worth."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _verdict(fit: Fit) -> Iterator[Part]:
 
 
 def question(fit: Fit) -> str:
-    """The question that was asked, in a sentence."""
+    """The question of a fit, in a sentence."""
     fitted = sum(s.role == "fit" for s in fit.runs.values())
     predicted = len(fit.runs) - fitted
     runs = f"{fitted} run{'s' if fitted != 1 else ''}"

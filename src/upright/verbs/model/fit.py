@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class FitAnswer(Answer["Fit"]):
-    """A fit, with the study that asked for it.
+    """A fit, with its study.
 
     Attributes
     ----------

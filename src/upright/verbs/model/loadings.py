@@ -72,7 +72,7 @@ def loadings(
     Raises
     ------
     BadInput
-        When logs and loadings do not match, or a column is not told.
+        When logs and loadings do not match, or a column is not named.
     NotIdentifiable
         When too few swings can be seen.
     """
