@@ -230,7 +230,8 @@ def test_numbers_are_those_of_the_runs_in_si_units():
     assert law["found"] == {
         "change": 0.24, "rise": 0.1011, "peak_time": 0.2022, "overshoot": 0.0303, "settling_2": 0.4044,
         "settling_5": 0.3505, "arrival": 0.6067, "error": 0.02 * SIZE, "effort_peak": 7.89, "effort_share": 0.789,
-        "saturated": 0.25, "rest": {"quiet": True, "rms": 0.02, "peak": 0.04}, "twist": 0.11, "travel": 0.22, "give": 0.05, "tripped": math.inf,
+        "saturated": 0.25, "rest": {"quiet": True, "rms": 0.02, "peak": 0.04},
+        "twist": 0.11, "travel": 0.22, "give": 0.05, "tripped": math.inf,
     }  # fmt: skip
     assert (law["within_limits"], told["laws"]["set 1"]["within_limits"]) == (False, True)
     assert told["laws"]["far"]["found"]["rise"] is None
