@@ -207,7 +207,12 @@ def fit_of(seed: int, folder: Path) -> Path:
     """What a fit of one twin of the cart could hold, its gain known to one percent."""
     rig = make_rig("linear", seed)
     entries = {n: {"value": v, "stderr": 0.0, "unit": "", "status": "known"} for n, v in rig.plant.parameters().items()}
-    entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": "N/V", "status": "firm"}
+    entries["actuator.gain"] = {
+        "value": rig.gain,
+        "stderr": 0.01 * rig.gain,
+        "unit": "N/V",
+        "status": "well determined",
+    }
     content = {
         "format": 1, "plant": "cart-pendulum", "verdict": "", "trusted": True, "parameters": entries,
         "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": hardware_of_make(rig).plain(),
