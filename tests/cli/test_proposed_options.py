@@ -29,6 +29,7 @@ OTHERS = {
 }  # fmt: skip
 """Options of arduino-cli, Octave, MuJoCo, FMPy, git and Dask."""
 SHOWN_BY = {
+    "rigs/firmware": "firmware flash",
     "rigs": "run", "realtime": "run", "running/run.py": "run", "running/rig.py": "run",
     "designing": "design", "experiments/regulation_2": "regulate", "experiments/swing_up_2b": "swing-up",
     "experiments/tracking_3": "track", "experiments/frequency_1b": "frequency", "study/draft": "init",

@@ -30,7 +30,6 @@ def law(which):
     return design.feedback(design.filtered(SAMPLED, 0.5), K)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("direction", [[0, 0, 1, 0], [0, 0, 0, 1]])
 def test_a_law_on_the_unstable_mode_recovers_what_the_limit_can(direction):
     """The coordinate z of that mode, z' = p z + b u, runs away beyond b U/p whatever u does; u = -k z reaches it."""
@@ -49,7 +48,6 @@ def test_a_law_on_the_unstable_mode_recovers_what_the_limit_can(direction):
     assert largest(rig, law(3), "inverted", direction, most=3 * bound) < bound
 
 
-@pytest.mark.slow
 def test_twice_the_start_with_twice_the_friction_and_limit_is_twice_the_motion():
     """Linear but for dry friction and limit, both of degree one: the limit cycle grows with the friction."""
     start = np.array([0.0, 0.0, 2e-4, 0.0])

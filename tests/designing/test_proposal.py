@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,24 @@ def test_no_pace_that_a_loop_can_hold_is_said():
     """A delay of half a second outlasts a fall by e every 0.13 s many times."""
     with pytest.raises(BadInput, match=r"no poles from 0\.7 to 2 times"):
         up.design(RIGS["furuta"], delay=250)
+
+
+@pytest.mark.parametrize("at", ["hanging", "inverted"])
+@pytest.mark.parametrize("name", RIGS)
+def test_proposed_poles_are_real_a_quarter_of_the_first_apart_and_of_the_rig_s_own_pace(name, at):
+    """Poles that meet make gains large; the pace is that of the fall upright, or of the slowest swing hanging."""
+    rig = RIGS[name]
+    poles = np.linalg.eigvals(rig.linear(at).A)
+    pace = poles.real.max() if at == "inverted" else np.abs(poles[np.abs(poles.imag) > 1e-3]).min()
+    request = up.design(rig, at=at).request
+    assert request.proposed in (0.7, 1.0, 1.4, 2.0)
+    np.testing.assert_allclose(request.poles, -request.proposed * pace * np.array([1.0, 1.25, 1.5, 1.75]), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("poles", "pace"),
+    [([3.0, 5.0, -1.0, -9.0], 5.0), ([-1 + 4j, -1 - 4j, -0.3 + 7j, -0.3 - 7j], math.sqrt(17)), ([-2.0, -5.0, 0.0], 2.0),
+     ([1e-7, -5.0], 5.0)],
+)  # fmt: skip
+def test_the_own_pace_is_the_fastest_fall_else_the_slowest_swing_else_the_slowest_decay(poles, pace):
+    assert own_pace(np.array(poles, dtype=complex)) == pytest.approx(pace)

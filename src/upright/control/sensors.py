@@ -222,7 +222,8 @@ def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: 
 def lifted(rig: Rig, shown: float) -> str:
     """What a hand that lifted the pendulum upright learns from its reading [rad]; "" when it is half a turn.
 
-    The encoder was zeroed where the pendulum hangs. A sign cannot be told, since half a turn either way is upright.
+    The encoder was zeroed where the pendulum hangs. A sign cannot be determined, since half a turn either way is
+    upright.
     """
     off = abs(abs(shown) - math.pi)
     if off <= math.radians(10):

@@ -30,7 +30,7 @@ from upright.rigs.tick_length import TickLength
 from upright.rigs.twin import TwinPort
 
 ALIKE = 1.5
-"""Factor by which the answer to a pulse may differ from the model's: friction of the day, but no doubled counts."""
+"""Factor by which the response to a pulse may differ from the model's: friction varies, counts do not double."""
 PULSES = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Pulses that are tried on the model, in shares of the largest command, until every coordinate would show `PLAIN`."""
 PLAIN = 60
@@ -44,7 +44,7 @@ Event = Callable[[float, str, str], None]
 
 
 def unheard(_t: float, _kind: str, _text: str) -> None:
-    """Events that nobody asked for."""
+    """Events of a fault."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,9 +90,9 @@ class Supervisor:
     rig : LiveRig
     duty : Duty
     event : callable
-        Told ``(time, kind, text)`` of what happens.
+        Called with ``(time, kind, text)`` of each event.
     stopped : callable
-        Asked at every tick whether somebody wants it to stop; answers with a sentence, or with an empty one.
+        Called at every tick; answers why to stop, or an empty text.
     clock : callable or None
         The host's own time [s], with which the board's is compared; None where the board's is virtual.
     """
@@ -441,7 +441,7 @@ def _free(about: Capabilities) -> Limits:
 
 
 def _wider(held: Limits, requested: Limits, about: Capabilities) -> str:
-    """What a rig holds wider, or far narrower, than it was asked to."""
+    """What a rig holds wider, or far narrower, than requested."""
     for name in ("travel", "speed", "start"):
         for which, mine, theirs in zip(about.coordinates, getattr(requested, name), getattr(held, name), strict=True):
             if theirs > mine * (1 + 1e-6) or not theirs > 0:

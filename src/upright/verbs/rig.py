@@ -202,7 +202,7 @@ def rig_doctor(
     pulse : bool
         Give a small pulse and compare its answer with the model's.
     hand : callable, optional
-        Asked to move a coordinate by hand, with a sentence; answers whether that was done.
+        Called with a sentence, to move a coordinate by hand; answers whether that was done.
 
     Returns
     -------
