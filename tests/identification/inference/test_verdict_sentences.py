@@ -144,7 +144,7 @@ def test_an_interrupted_search_is_judged_on_its_prediction_alone() -> None:
     assert bad.answer == "no"
     assert bad.reasons[:2] == (
         "Not evaluated: interrupted. This is from the best so far.",
-        "No number asked is determined well, so others would explain the runs as well.",
+        "No estimated number is determined well, so others would explain the runs as well.",
     )
 
 
@@ -194,7 +194,7 @@ def test_all_numbers_can_be_used_and_none_was_asked() -> None:
     told = judged(estimates={"J_p": firm(), "b_2": firm(), "m_p": firm(status="known")})[1]
     assert (told.answer, told.headline, told.advice) == ("yes", "All numbers can be used: J_p, b_2.", "")
     nothing = judged(estimates={"m_p": firm(status="known"), "b_2": firm(status="left out")})[1]
-    assert (nothing.answer, nothing.headline) == ("yes", "Nothing was asked.")
+    assert (nothing.answer, nothing.headline) == ("yes", "Nothing was estimated.")
 
 
 WEAK = {"status": "weak", "unit": "kg m^2"}
@@ -281,7 +281,7 @@ def test_numbers_bent_by_a_dead_time_are_not_used() -> None:
     some, all_ = (judged(estimates=e, bent=bent)[1] for bent in (("J_p",), ("J_p", "b_2")))
     assert (some.answer, some.headline) == ("in part", "These numbers can be used: b_2.")
     assert some.reasons[0].startswith("J_p: outside their intervals once the drive may act late")
-    assert (all_.answer, all_.headline) == ("no", "None of them before the drive's delay is asked for.")
+    assert (all_.answer, all_.headline) == ("no", "None of them before the drive's delay is estimated.")
 
 
 @pytest.mark.parametrize(

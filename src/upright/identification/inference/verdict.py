@@ -225,7 +225,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
         )
     elif estimated and not firm and not evidence.unseen:
         no = True
-        reasons.append("No number asked is determined well, so others would explain the runs as well.")
+        reasons.append("No estimated number is determined well, so others would explain the runs as well.")
     for n, e in estimated.items():
         low, high = e.interval
         limit = evidence.rig.bounds(n) if n in evidence.rig.parameters else (-math.inf, math.inf)
@@ -281,7 +281,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
     elif guessed:
         answer, headline = "in part", "As numbers of a plant that was guessed."
     elif evidence.bent and not free:
-        answer, headline = "no", "None of them before the drive's delay is asked for."
+        answer, headline = "no", "None of them before the drive's delay is estimated."
     elif reasons:
         answer, headline = "in part", f"These numbers can be used: {', '.join(free)}."
         if not free:
@@ -289,7 +289,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
             missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in firm))
             headline = "Only their ratios." if scaled or not missing else f"None of them before {missing} is measured."
     else:
-        answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was asked."
+        answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was estimated."
     advice = ""
     if any(e.status in ("weak", "unseen") for e in estimated.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
