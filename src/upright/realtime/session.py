@@ -191,6 +191,8 @@ def carry_out(
             hear.log.event(*event)
         ticking, warning = pace(about)
         end["warning"] = warning
+        if about.paced and not about.virtual:
+            beside.clock = clock.monotonic
         beside.start(order.mode)
         stage.let_go()
         _loop(order, beside, ticking, hear.log, show, end)

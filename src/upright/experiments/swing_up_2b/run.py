@@ -16,10 +16,12 @@ import numpy as np
 
 from upright.basis import SIMULATED
 from upright.control import SwingUp, design_swing_up, trial
+from upright.control.effort import RestEffort, rest_effort, shown
 from upright.control.score import FALLEN
-from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, scales, shown_by_encoders
+from upright.control.sensors import KNOWN, Scales, probe, scales, shown_by_encoders
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import readings
+from upright.control.watch import Suspicion, Watch
 from upright.errors import BadInput, NotIdentifiable, RigStopped, nearest
 from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.gains import feedback, filtered
@@ -119,9 +121,18 @@ class SwingUpRun:
         return a is not None and math.isinf(a.tripped) and a.up <= float(a.trial.t[-1]) - HELD
 
     @property
+    def rest(self) -> RestEffort | None:
+        """What holding takes once it stands; None where it does not."""
+        if self.ascent is None or not self.caught:
+            return None
+        run = self.ascent.trial
+        stands = run.t >= self.ascent.up
+        return rest_effort(run.t[stands], run.u[stands], self.law.limit)
+
+    @property
     def sound(self) -> bool:
-        """Whether what was tried came off, whatever its model is worth."""
-        return self.caught
+        """Whether it was caught and stands by a quiet command, whatever its model is worth."""
+        return self.rest is not None and self.rest.quiet
 
     @property
     def verdict(self) -> str:
@@ -143,8 +154,15 @@ class SwingUpRun:
         again = f" at the {len(a.handovers)}. catch" if len(a.handovers) > 1 else ""
         return (
             f"From hanging to upright in {a.up:.2f} s and {a.swings} half swings{again}, {took}; "
-            f"it stood to the end, {float(a.trial.t[-1]) - a.up:.3g} s."
+            f"it stood to the end, {float(a.trial.t[-1]) - a.up:.3g} s.{self._holding()}"
         )
+
+    def _holding(self) -> str:
+        """What holding takes, as a sentence after others."""
+        if self.rest is None:
+            return ""
+        excessive = "" if self.rest.quiet else " That is excessive effort: take finer encoders or slower differences."
+        return f" The command at rest {shown(self.rest, self.law.limit, self.model.unit)}.{excessive}"
 
 
 def known_of(identified: Rig) -> Mapping[str, float]:

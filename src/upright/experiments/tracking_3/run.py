@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from upright.basis import SIMULATED
 from upright.control import Trial, trial
-from upright.control.effort import Effort, effort
+from upright.control.effort import Effort, RestEffort, effort, rest_effort, resting
 from upright.control.score import StepFigures, step_figures
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
@@ -64,6 +64,8 @@ class StepTrial:
         Of the far body; None where the rig trips or nothing moves.
     effort : Effort
         Of the step, up to the push.
+    rest : RestEffort or None
+        Of the last third of that, about what keeps the place; None where the run ended before.
     twist, travel : float
         Largest distance between the bodies, and from where they began, up to the push [m or rad].
     give : float
@@ -75,6 +77,7 @@ class StepTrial:
     trial: Trial
     figures: StepFigures | None
     effort: Effort
+    rest: RestEffort | None
     twist: float
     travel: float
     give: float
@@ -93,6 +96,11 @@ class Outcome:
     def tried(self) -> bool:
         """Whether the rig was stepped with it; else the measured figures are the predicted ones."""
         return self.measured is not self.predicted
+
+    @property
+    def quiet(self) -> bool:
+        """Whether the command is quiet once the step is done; a run that ended before says nothing of that."""
+        return self.measured.rest is None or self.measured.rest.quiet
 
     @property
     def within(self) -> bool:
@@ -302,7 +310,7 @@ def choose_step(model: Rig, laws: Sequence[Tracker], step: float | None = None) 
 
 
 def _times_as_fast(model: Rig) -> float:
-    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).plant)]
+    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).rig.plant)]
     return swings[0] / swings[1]
 
 
@@ -345,6 +353,11 @@ def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
     )  # fmt: skip
 
 
+def _rest(t: Array, u: Array, limit: float) -> RestEffort:
+    """Command at rest about its mean, which a spring to ground may take to hold a place."""
+    return rest_effort(t, u - float(np.mean(resting(u))), limit)
+
+
 def figured(trial: Trial, step: float) -> StepTrial:
     """Figures of a trial, which may have ended before its time."""
     rig = trial.rig
@@ -367,6 +380,7 @@ def figured(trial: Trial, step: float) -> StepTrial:
             figures = None
     return StepTrial(
         trial=trial, figures=figures, effort=effort(trial.u[before : last + 1], rig.limit, rig.converter),
+        rest=None if ended else _rest(trial.t[before:at], trial.u[before:at], rig.limit),
         twist=float(apart[: last + 1].max()), travel=float(away[: last + 1].max()),
         give=math.inf if ended else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
     )  # fmt: skip
