@@ -291,7 +291,7 @@ def _bring(
         if now.time - there >= QUIET:
             return
         if now.time - first > PATIENCE:
-            beside.give_up(Fault.START, f"nobody brought it where it is to be held within {PATIENCE:g} s.")
+            beside.give_up(Fault.START, f"it was not brought where it is to be stabilised within {PATIENCE:g} s.")
         show(RunState(phase=stage.advice or "waiting", time=now.time, tick=now.tick, mode=now.mode))
 
 
