@@ -41,13 +41,14 @@ identification
 rig
 study
 study.draft
-control live
+control
 rigs
 realtime
 report
 report.fit
 report.ladder report.law report.log report.rig
 report.run
+live
 diagnosis questionnaire designing
 paper
 running

@@ -225,7 +225,7 @@ def test_runs_of_one_group_share_one_number_that_a_prediction_is_given() -> None
     assert [(u.name, u.group, u.runs) for u in problem.unknowns] == [("friction", "x", (0, 2)), ("friction", "y", (1,))]
     assert [problem.key(i) for i in range(2)] == ["group x: friction", "group y: friction"]
     assert [problem.sought_in(i).tolist() for i in range(3)] == [[0], [1], [0]]
-    given = formulate(rig_, runs[:1], given={"x": {"friction": 1.3}, "y": {"friction": 9.0}})
+    given = formulate(rig_, runs[:1], stated={"x": {"friction": 1.3}, "y": {"friction": 9.0}})
     assert [(u.value, u.lower, u.upper) for u in given.unknowns] == [(1.3, 1.3, 1.3)]
 
 

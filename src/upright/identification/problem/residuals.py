@@ -176,9 +176,9 @@ class Problem:
     def ahead(self, seconds: float) -> Problem:
         """The problem with its filtered runs predicted so many seconds ahead alone, from the same restarts."""
         tracks = [t.predicting(seconds) if t.ahead else t for t in self.tracks]
-        found = replace(self, tracks=tracks)
-        found._solvers.update(self._solvers)
-        return found
+        further = replace(self, tracks=tracks)
+        further._solvers.update(self._solvers)
+        return further
 
     def _setting(self, index: int, x: Array) -> Setting:
         """What one run is simulated with, for coordinates `x` (sought, lanes)."""
@@ -333,11 +333,11 @@ class Problem:
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
         skip = min(track.first, n - 1)
         counts = slice(skip, n) if track.retained is None else np.flatnonzero(track.retained[:n])
-        seen = [motion[counts, c] for c in track.columns]
+        observed = [motion[counts, c] for c in track.columns]
         if track.principal is None:
-            G = squares(seen, track.y[counts], d.offsets, track.weights, d.scales)
+            G = squares(observed, track.y[counts], d.offsets, track.weights, d.scales)
         else:
-            G = squares(*mixed(seen, track.y[counts], d.offsets, d.scales, track.principal))
+            G = squares(*mixed(observed, track.y[counts], d.offsets, d.scales, track.principal))
         h = self.steps[sought]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
@@ -393,11 +393,11 @@ class Problem:
 
 
 def formulate(
-    rig: GreyBox, runs: Sequence[Run], *, thin: bool = True, given: Mapping[str, Mapping[str, float]] | None = None
+    rig: GreyBox, runs: Sequence[Run], *, thin: bool = True, stated: Mapping[str, Mapping[str, float]] | None = None
 ) -> Problem:
     """Set up the problem of explaining `runs`.
 
-    `thin` drops samples of free runs that their period does not need; `given` holds what is known of a group of runs,
+    `thin` drops samples of free runs that their period does not need; `stated` holds what is known of a group of runs,
     by its label and name.
     """
     tracks = [prepare(rig, run, thin=thin) for run in runs]
@@ -406,7 +406,7 @@ def formulate(
         place = next((i for i, o in enumerate(unknowns) if u.group and (o.name, o.group) == (u.name, u.group)), None)
         if place is not None:
             unknowns[place] = replace(unknowns[place], runs=(*unknowns[place].runs, *u.runs))
-        elif (value := (given or {}).get(u.group, {}).get(u.name)) is not None:
+        elif (value := (stated or {}).get(u.group, {}).get(u.name)) is not None:
             unknowns.append(replace(u, value=value, lower=value, upper=value))
         else:
             unknowns.append(u)
@@ -456,8 +456,8 @@ def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
 def _shortest(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:
     """Least presliding length worth telling, by its name."""
     derived = rig.plant.derived()
-    seen = [pair for run in runs for pair in zip(run.measured, run.resolution, strict=False)]
-    steps = [min((resolution for name, resolution in seen if name == c), default=0.0) for c in derived.coordinates]
+    pairs = [pair for run in runs for pair in zip(run.measured, run.resolution, strict=False)]
+    steps = [min((resolution for name, resolution in pairs if name == c), default=0.0) for c in derived.coordinates]
     return {j.presliding: ROUNDING * float(np.abs(j.direction) @ steps) for j in derived.joints if j.presliding}
 
 
