@@ -32,7 +32,7 @@ MOST = 20_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loaded:
-    """One free swing with a known inertia added [kg or kg m^2]; `command` is what the drive was told meanwhile."""
+    """One free swing with a known inertia added [kg or kg m^2]; `command` is the drive's meanwhile."""
 
     label: str
     added: float
@@ -78,7 +78,7 @@ def swings(
     command : str
         Column of the command: piecewise constant.
     resolution : float, optional
-        Smallest step of the sensor, told from the column when omitted.
+        Smallest step of the sensor, from the column when omitted.
 
     Raises
     ------
@@ -215,7 +215,9 @@ def _damping(loaded: Sequence[Loaded], k: Estimate) -> Estimate:
 
 def _verdict(levels: int, dof: int, chi: float, k: Estimate, bare: Estimate) -> str:
     if bare.interval[0] <= 0:
-        return "The bare body's inertia cannot be told from nothing: its interval reaches zero. Add less, or repeat."
+        return (
+            "The bare body's inertia cannot be distinguished from zero: its interval reaches zero. Add less, or repeat."
+        )
     if levels == 2:
         return "Two loadings fix a line but cannot show that it is one; a third would."
     from scipy.stats import chi2

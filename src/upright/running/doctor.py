@@ -1,4 +1,4 @@
-"""Is this rig wired as it is described? Asked before any loop: link, limits, encoders by hand, a small pulse."""
+"""Is this rig wired as it is described? Checked before any loop: link, limits, encoders by hand, a small pulse."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def check_up(
     ----------
     path : Path
     hand : callable, optional
-        Asked, with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
+        Called with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
         A twin's own hand does it when omitted.
     clear : bool
         Whether latched faults are forgotten first.
@@ -137,7 +137,7 @@ def _by_hand(
         away[2 * i] = 2 * size
         rig.port.hold(next(iter(model.plant.equilibria)), away)
     else:
-        return CheckupFinding(what=what, observed="nobody moved it", good=None)
+        return CheckupFinding(what=what, observed="it was not moved", good=None)
     moved = (rig.exchange(0.0).counts[i] - before.counts[i]) / per
     shown = f"{math.degrees(moved):.3g} degrees" if unit == "rad" else f"{1e3 * moved:.3g} mm"
     if abs(moved) < size / 10:

@@ -67,7 +67,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml they are made on the rig itself; you are asked for what no drive can do.
+    With a RIG.toml they are made on the rig itself; you are prompted for what no drive can do.
 
     upright lab
     upright lab --rig linear --seed 3
@@ -94,10 +94,10 @@ def lab(
     experiment : str or sequence of str, optional
         Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
     rig : str, optional
-        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of a rig at hand
+        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
     seed : int
-        Which rig of the make; 0 is the one as designed. Of a rig at hand, that of the rigs drawn from its fit.
+        Random seed of the rig model; 0 is nominal. On hardware, that of the rigs drawn from its fit.
     out : path, optional
         Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
@@ -111,7 +111,7 @@ def lab(
         Why laws from a fit that is not trusted drive hardware all the same; the logs keep it. Without it such laws are
         not armed.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     ask : callable, optional
         Asks the person beside a rig for something, in a sentence; answers whether it was done. Hardware needs it.
     watching : callable, optional
@@ -191,7 +191,7 @@ def _live(
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, nonideal: bool, alone: bool,
     accept: str,
 ) -> LiveStand:  # fmt: skip
-    """The rig of a RIG.toml; what cannot be had of it is said first."""
+    """The rig of a RIG.toml; what it cannot do is reported first."""
     from upright.experiments.stand.live import live_stand, nobody, nobody_watches
     from upright.experiments.stand.templates import write_templates
     from upright.report.symbols import typed
@@ -201,16 +201,14 @@ def _live(
     if rig.startswith("serial:"):
         path = write_templates(folder, rig.removeprefix("serial:"))
         raise BadInput(
-            "a rig of hardware needs a description and limits, which nobody else can know: fill in "
+            "a rig of hardware needs a description and limits, which only you know: fill in "
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
-        raise BadInput(
-            "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."
-        )
+        raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")
     return live
 
 
@@ -316,7 +314,7 @@ def survey(
     Raises
     ------
     BadInput
-        When the sheet cannot be read, or it is not told on how many answers it rests.
+        When the sheet cannot be read, or the number of answers is not specified.
     """
     from upright.questionnaire.chapter import chapter
     from upright.questionnaire.sheet import Ratings, read_sheet, read_table
@@ -342,7 +340,7 @@ def survey(
         if n is not None:
             raise BadInput(f"--n is for printed summaries; '{name}' holds single answers, which are counted.")
     elif n is None:
-        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they are said to rest on.")
+        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they rest on.")
     again = f"{command}{'' if n is None else f' --n {n}'} --json"
     page = chapter(
         sheet, title=f"Survey: {Path(name).stem.replace('_', ' ')}", source=name, answers=n, scale=limits,

@@ -41,7 +41,7 @@ PROBED, PERIODS = 2, 8
 
 @dataclass(frozen=True, kw_only=True)
 class Asking:
-    """What the rig is asked: a band [rad/s], amplitudes wanted [m or rad], and one period of the command that asks."""
+    """Excitation of the rig: a band [rad/s], amplitudes wanted [m or rad], and one period of the command."""
 
     band: tuple[float, float]
     reach: Array
@@ -64,7 +64,7 @@ def asking(stand: TestStand) -> Asking:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
             raise BadInput(
-                f"{model.name} does not swing about '{at}', and the band of frequencies it is asked is told from its "
+                f"{model.name} does not swing about '{at}', and the band of its excitation follows from its "
                 "swings; log a step of it instead (upright run --excite), and fit that (upright identify)."
             )
         band = (BELOW * min(swings), ABOVE * max(swings))
@@ -146,7 +146,7 @@ def _run(label: str, log: Record, request: Asking, periods: int) -> dict[str, An
 
 
 def _from_rest(stand: TestStand, wave: Array, periods: int) -> list[float]:
-    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those asked for.
+    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those requested.
 
     What begins at once gives a free axis a push, on which it drifts out of its travel.
     """

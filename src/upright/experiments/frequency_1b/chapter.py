@@ -1,4 +1,4 @@
-"""Experiment 1b as a chapter: what was asked, what came back, both fits side by side, and the pole to be held."""
+"""Experiment 1b as a chapter: excitation, response, both fits side by side, and the pole to be stabilised."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def chapter(result: FrequencyRun) -> Chapter:
         f"interval. {_simplex_sentence(answer)}",
         sound=answer.fit.trusted,
         parts=(
-            Part("What was asked", (*_campaign(result), _quality_picture(answer.data))),
+            Part("Excitation", (*_campaign(result), _quality_picture(answer.data))),
             *_answer_parts(answer, truth=result.truth, known=_bench(result)),
         ),
         steps=_steps(result),
@@ -64,7 +64,7 @@ def log_chapter(result: LoggedResponse) -> Chapter:
     data, answer = result.response, result.answer
     span = f"{data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s"
     sources = f"{len(data)} frequencies from {span} in {', '.join(result.sources)}."
-    source_part = Part("What was asked", (sources, *data.notes, _quality_picture(data)))
+    source_part = Part("Excitation", (sources, *data.notes, _quality_picture(data)))
     fit = typed(result.folder / "fit.json")
     if answer is not None:
         return Chapter(
@@ -149,7 +149,7 @@ def _campaign(result: FrequencyRun) -> tuple[str, ...]:
         late = settle.size - waited.size
         rest = f"; {late} had not settled after 40 s, and what beats there counts as their error" if late else ""
         sentences.append(
-            "Each sine was awaited until what was left of its transient, told from the data, had died away: "
+            "Each sine ran until its transient, estimated from the data, had decayed: "
             f"{waited.min():.0f} to {waited.max():.0f} s{rest}."
         )
     else:
@@ -263,7 +263,7 @@ def _way_table(answer: FrequencyFit) -> Table:
 
 
 def _parameter_table(answer: FrequencyFit, truth: Mapping[str, float] | None = None) -> Table:
-    """Every number, by both ways; a magnitude of the linear model is not asked for all of them."""
+    """Every number, by both ways; a magnitude of the linear model does not determine all of them."""
     unasked = {j.coulomb for j in answer.rig.plant.joints} | {"actuator.lag", "actuator.delay"}
     unasked |= {n for n, p in answer.rig.parameters.items() if not p.estimate}
     walked = {n: "–" if n in unasked else number(answer.simplex.values[n]) for n in answer.fit.estimates}

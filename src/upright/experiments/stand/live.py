@@ -35,7 +35,7 @@ def nobody_watches() -> AbstractContextManager[Watch]:
 
 
 def nobody(_sentence: str) -> bool:
-    """Hands of a twin: what a person would be asked for is done already."""
+    """Hands of a twin: what a person would do is done already."""
     return True
 
 
@@ -47,7 +47,7 @@ class LiveStand(TestStand):
     ----------
     file : RigFile
     person : callable
-        Asked for something, in a sentence; answers whether it was done.
+        Called with a request, in a sentence; answers whether it was done.
     watching : callable
         Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
     accept : str
@@ -62,7 +62,7 @@ class LiveStand(TestStand):
 
     @property
     def text(self) -> str:
-        """What is said of it: RIG.toml, and what describes the rig."""
+        """Its description: RIG.toml, and what describes the rig."""
         known = self.file.known
         return read_text(self.file.path) + ("" if known is None else read_text(known))
 
@@ -76,7 +76,7 @@ class LiveStand(TestStand):
     def ask(self, sentence: str) -> None:
         """Ask the person beside it; see `TestStand.ask`."""
         if not self.person(sentence):
-            raise RigStopped(f"This was asked for and not done: {sentence}")
+            raise RigStopped(f"This was requested and not done: {sentence}")
 
     def run(
         self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0
@@ -180,9 +180,7 @@ def live_stand(
     library()
     file = read_rig_file(path)
     if file.performed == REPLAYED:
-        raise BadInput(
-            f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
-        )
+        raise BadInput(f'{path}: a replay does not answer commands; experiments need a rig or kind = "twin".')
     rig, truth = described(file)
     units = {c.name: c.unit for c in rig.plant.coordinates}
     limits = file.limits(units, rig.unit, usual_limits(rig))

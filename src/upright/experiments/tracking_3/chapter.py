@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from upright.basis import SIMULATED
+from upright.control.effort import QUIET_RMS, of_limit
 from upright.experiments.tracking_3 import tables
 from upright.experiments.tracking_3.figures import (
     RootLocus,
@@ -37,13 +38,13 @@ def chapter(result: Tracking) -> Chapter:
         parts.append(_friction(result, far))
     if result.pd is not None and result.stiff is not None and result.far is not None:
         parts.append(_why(result, result.pd, result.stiff, result.far, near, far))
-    ended = " It was interrupted; what was finished is told." if result.interrupted else ""
-    detail = "Foreseen on the fitted numbers; no rig was touched."
+    ended = " It was interrupted; what was finished is reported." if result.interrupted else ""
+    detail = "Predicted with the fitted numbers; no rig was touched."
     if result.tried:
         left = [o.law.name for o in result.outcomes if not o.tried]
         detail = "Seen on the twin: no rig was touched." if result.simulated else "Tried on the rig."
         if left:
-            detail = f"Tried on the rig, but for what is foreseen to leave the bounds: {', '.join(left)}."
+            detail = f"Tried on the rig, but for what is predicted to leave the bounds: {', '.join(left)}."
     page = Chapter(
         key="3", title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
@@ -63,8 +64,8 @@ def _verdict(result: Tracking) -> str:
         head = f"A step of {length(result, size)} is too much for {', '.join(map(_beyond, bad))}"
     got, effort = best.measured.figures, percentage(best.measured.effort.share, 0)
     if got is None:
-        return f"{head}."
-    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
+        return f"{head}.{_busy(result)}"
+    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}.{_busy(result)}"
     if result.pd is None or result.stiff is None or result.pd.measured.figures is None:
         return head
     pd, stiff = result.pd.measured, result.stiff.measured.figures
@@ -76,6 +77,15 @@ def _verdict(result: Tracking) -> str:
         f"{percentage(pd.give / size, 0)} of the step, {best.law.name} by "
         f"{percentage(best.measured.give / size, 0)}; made as stiff, the PD {slow}."
     )
+
+
+def _busy(result: Tracking) -> str:
+    """Sets whose command is excessive at rest, as a sentence after others."""
+    busy = [(o.law.name, o.measured.rest) for o in result.sets if o.measured.rest and not o.measured.rest.quiet]
+    if not busy:
+        return ""
+    rms = ", ".join(f"{of_limit(rest.rms)} with {name}" for name, rest in busy)
+    return f" At rest the effort is excessive: the command's rms is {rms} ({100 * QUIET_RMS:.0f} % is quiet)."
 
 
 def _beyond(o: Outcome) -> str:
@@ -90,9 +100,9 @@ def _arrives(arrival: float) -> str:
 
 
 def _sound(result: Tracking) -> bool:
-    """Whether every set stays within the limits and settles."""
+    """Whether every set stays within the limits, settles, and is quiet at rest."""
     settled = all(o.measured.figures is not None and math.isfinite(o.measured.figures.settling_5) for o in result.sets)
-    return settled and all(o.within for o in result.sets)
+    return settled and all(o.within and o.quiet for o in result.sets)
 
 
 def _strongest(result: Tracking) -> Outcome:
@@ -187,8 +197,8 @@ def _gains(result: Tracking, far: str) -> Part:
             tables.shaft_pole_table(result),
             Picture(
                 name="track-poles", draw=lambda: poles_figure(result),
-                caption="Poles asked (rings), of the sampled, late loop on the fitted model (+) and on the rig (x). "
-                "Delay and differences move the fast poles; the flexible mode stays where it was asked.",
+                caption="Poles requested (rings), of the sampled, late loop on the fitted model (+) and the rig (x). "
+                "Delay and differences move the fast poles; the flexible mode stays where it was requested.",
                 description="Upper half of the s-plane for every set.",
             ),
         ),
@@ -214,7 +224,7 @@ def _loop(result: Tracking, near: str, far: str) -> Part:
     sentence = f"Largest command, of the drive's limit: {shares}."
     if result.tried:
         sentence += (
-            f" Foreseen for {best.law.name}: "
+            f" Predicted for {best.law.name}: "
             f"{best.predicted.effort.peak:.3g} {result.rig.unit} ({percentage(best.predicted.effort.share)}); found "
             + ("the same." if off < 5e-4 else f"{best.measured.effort.peak:.3g} {result.rig.unit}.")
         )
@@ -270,9 +280,9 @@ def _why(result: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near
     trips = other_end.measured.tripped
     end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
     if result.tried and not other_end.tried:
-        end = f"was not tried; it is foreseen that it {end}"
+        end = f"was not tried; it is predicted that it {end}"
     guessed = [o.law.name for o in compared if result.tried and not o.tried]
-    foreseen = f" Foreseen, not tried: {', '.join(guessed)}." if guessed else ""
+    foreseen = f" Predicted, not tried: {', '.join(guessed)}." if guessed else ""
     tried = 0 if result.search is None else result.search.kp.size
     return Part(
         "Why state feedback",
@@ -347,6 +357,7 @@ def _numbers(result: Tracking) -> dict[str, Any]:
         names = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
         return {
             **{n: None if f is None else getattr(f, n) for n in names},
+            "rest": None if r.rest is None else {"quiet": r.rest.quiet, "rms": r.rest.rms, "peak": r.rest.peak},
             "effort_peak": r.effort.peak, "effort_share": r.effort.share, "saturated": r.effort.saturated,
             "twist": r.twist, "travel": r.travel, "give": r.give, "tripped": r.tripped,
         }  # fmt: skip

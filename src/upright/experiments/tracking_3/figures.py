@@ -104,7 +104,7 @@ def _efforts(ax: Any, result: Tracking, outcomes: Sequence[Outcome], until: floa
 
 @styled
 def poles_figure(result: Tracking) -> Figure:
-    """Poles asked and attained, set by set; the upper half plane, which the lower mirrors."""
+    """Requested and attained poles, set by set; the upper half plane, which the lower mirrors."""
     laws, open_loop = [o.law for o in result.sets], result.model.linear(AT).poles()
     columns = min(2, len(laws))
     rows = -(-len(laws) // columns)
@@ -119,7 +119,7 @@ def poles_figure(result: Tracking) -> Figure:
         s_plane(ax)
         on_rig = loop_poles(result.rig, law.law)
         kinds = (
-            ("open loop", open_loop, "x", GREY, 6), ("asked", law.requested, "o", BLACK, 9),
+            ("open loop", open_loop, "x", GREY, 6), ("requested", law.requested, "o", BLACK, 9),
             ("on the fitted model, sampled and late", law.poles, "+", BLUE, 9),
             ("on the rig", on_rig, "x", VERMILLION, 6),
         )  # fmt: skip

@@ -57,7 +57,7 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
     describe(tables, record, inspection, recognised)
     if not plant:
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
-        rig.key("guessed", True, "nobody named the plant: take this out once you know it is this one")
+        rig.key("guessed", True, "the plant was not specified: take this out once you know it is this one")
     doubts = [*recognised.doubts, *([] if plant else alike(record, inspection, recognised))]
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
@@ -78,7 +78,7 @@ def window_of(tables: Sequence[TomlTable], record: Record) -> str:
 
 
 def alike(record: Record, inspection: Inspection, recognised: Recognised) -> list[str]:
-    """Sentence on the other plants that the columns could be of, and what each explains where it can be told.
+    """Sentence on the other plants that the columns could be of, and what each explains where it is known.
 
     Counts of an unknown encoder do not tell: a pendulum's angle has to be an angle. Carts from disks they never tell,
     and what was recognised says so already.

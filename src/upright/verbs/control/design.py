@@ -56,7 +56,7 @@ def design(
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
     The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
-    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is asked for; period, delay and
+    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is requested; period, delay and
     differenced encoders are then put in.
 
     Parameters
@@ -82,7 +82,7 @@ def design(
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool
-        Gains whose sampled loop has the poles asked.
+        Gains whose sampled loop has the requested poles.
     seed : int
         Of the rigs drawn from the fit's covariance.
     out : path, optional
@@ -163,8 +163,8 @@ def _sampling(model: StateSpace, period: float | str | None) -> float:
         raise BadInput('these matrices are continuous, and a computer closes the loop: say how often, --period "2 ms".')
     if requested is not None and model.dt and not math.isclose(requested, model.dt, rel_tol=1e-9):
         raise BadInput(
-            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * requested:.6g} ms was "
-            "asked for; leave --period out, or give a continuous model."
+            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * requested:.6g} ms is "
+            "requested; leave --period out, or give a continuous model."
         )
     return model.dt or requested or 0.0
 

@@ -80,7 +80,7 @@ def ladder(
         Who predicts each run from a fit of the others: processes of this machine, the address of a Dask scheduler, or
         an executor of `concurrent.futures`.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def ladder(
     Raises
     ------
     BadInput
-        When the study or a log is wrong, or nothing is asked.
+        When the study or a log is wrong, or nothing is to be estimated.
     KeyboardInterrupt
         When Ctrl-C came before the first rung stood.
     """
@@ -114,7 +114,9 @@ def ladder(
         for name in ("ladder.json", "study.toml", "ladder.html"):
             check_output(at / name)
     if not requested.model.estimated:
-        raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
+        raise BadInput(
+            f'{study}: nothing to estimate; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}'
+        )
     climbed = climb(requested.model, requested.runs, requested.ladder or None, progress=progress, workers=shared)
     if not climbed.steps:
         raise KeyboardInterrupt
