@@ -25,6 +25,7 @@ from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
+from upright.identification.inference.ties import ties, with_ties
 from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
@@ -247,7 +248,7 @@ def _conclude(
     per_run, groups = run_estimates(best)
     for name, value in log.rivals.items():
         e = widened(estimates[name], (value, value))
-        estimates[name] = replace(e, status="weak" if e.status == "firm" else e.status)
+        estimates[name] = replace(e, status="poorly determined" if e.status == "well determined" else e.status)
     left_out = [n for n in requested.estimated if n not in problem.rig.estimated]
     for name in left_out:
         unit = requested.parameters[name].unit
@@ -276,7 +277,8 @@ def _conclude(
     unseen = () if best.lost else identifiable.sentences({n: p.unit for n, p in requested.parameters.items()})
     conventions = tuple(log.conventions()) if least_explained(scores) < GOOD else ()
     assumed = assumptions(best, estimates, evaluate=not brief)
-    estimates = with_assumptions(estimates, assumed)
+    tied = () if brief else ties(best, estimates)
+    estimates = with_assumptions(with_ties(estimates, tied), assumed)
     late = None if brief or little or conventions else lateness(best)
     warnings += [late.sentence] if late else []
     answers = judge(
@@ -296,6 +298,7 @@ def _conclude(
             judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
+            ties=tied,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
         )
     )

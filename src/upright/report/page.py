@@ -74,7 +74,7 @@ class Table:
     numbers : tuple of int
         Columns set flush right.
     badge : int, optional
-        Column of single words that say how something turned out, such as ``firm``, ``weak`` or ``kept``.
+        Column of single words that say how something turned out, such as ``kept`` or ``well determined``.
     folded : str
         Line under which a screen hides the table until it is opened; not hidden when empty.
     anchors : tuple of str

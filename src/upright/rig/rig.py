@@ -143,7 +143,7 @@ class Rig(Shown):
         }  # fmt: skip
         entries: dict[str, Entry] = {}
         gone: set[str] = set()
-        for name in _ENTRIES.keys() & changes.keys():
+        for name in [n for n in _ENTRIES if n in changes]:
             value = in_unit(changes.pop(name), units[name])
             if name in ("limit", "period") and not 0 < value < math.inf:
                 raise BadInput(f"the {name} of a rig must be positive and finite, got {value:g}.")

@@ -247,7 +247,7 @@ def _expected(make: Make, omega: ArrayLike) -> Array:
 
 def _level(make: Make, omega: ArrayLike) -> Array:
     """Relative command at each frequency: as much as the most mobile coordinate stands."""
-    return np.minimum(make.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
+    return np.minimum(make.rig.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
 
 
 def _moved(rig: Rig, u: Array) -> Array:

@@ -310,7 +310,7 @@ def choose_step(model: Rig, laws: Sequence[Tracker], step: float | None = None) 
 
 
 def _times_as_fast(model: Rig) -> float:
-    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).plant)]
+    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).rig.plant)]
     return swings[0] / swings[1]
 
 

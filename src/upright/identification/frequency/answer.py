@@ -155,7 +155,7 @@ def _fit(
         low, high = value - q * s, value + q * s
         weak = high - low > abs(value) or Estimate.within(value, s, q * s).zero_wide
         bound = value < 1e-6 * rig.parameters[name].value
-        status = "at bound" if bound else "weak" if weak else "firm"
+        status = "at bound" if bound else "poorly determined" if weak else "well determined"
         estimates[name] = Estimate(value=value, stderr=s, interval=(max(low, 0.0), high), unit=unit, status=status)
     size = np.where(sigma > 0, sigma, 1.0)  # what the response does not depend on has no variance
     sentence, trusted = verdict(squares, key)

@@ -202,7 +202,7 @@ def _known(name: str, value: float | str | tuple[float, float], make: str) -> tu
         return si(value, ""), 0.0
     from upright.units import measured
 
-    plant = MAKES[make].plant
+    plant = MAKES[make].rig.plant
     if name in plant.names():
         return measured(value, plant.quantity(name).unit)
     return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")
