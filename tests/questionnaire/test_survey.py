@@ -275,5 +275,5 @@ def test_each_printed_change_has_one_verdict_and_its_gain(tmp_path):
     assert found["more"]["t"][1] == pytest.approx(4.0, rel=1e-12)
     assert told.verdict == (
         "1 of 3 changes are significant at 5 % however the single answers were paired and spread; 1 is not significant,"
-        " however they were; 1 cannot be told from the means alone."
+        " however they were; 1 are not decided by the means alone."
     )

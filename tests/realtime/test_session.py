@@ -113,7 +113,7 @@ def test_samples_that_a_pacing_rig_lost_are_late_ticks(tmp_path):
 def test_a_rig_that_nobody_brings_to_its_start_is_given_up_after_the_patience(tmp_path, monkeypatch):
     monkeypatch.setattr("upright.realtime.session.PATIENCE", 0.5)
     end, shown, log = run_of(tmp_path, stage=lambda: replace(staged(TwinPort(RIG)), bring=lambda: None, advice="lift"))
-    assert "Nobody brought it where it is to be held within 0.5 s" in end.stopped
+    assert "It was not brought where it is to be stabilised within 0.5 s" in end.stopped
     assert log is None
     assert end.ticks == 0
     assert PATIENCE == 120.0

@@ -191,6 +191,8 @@ def carry_out(
             hear.log.event(*event)
         ticking, warning = pace(about)
         end["warning"] = warning
+        if about.paced and not about.virtual:
+            beside.clock = clock.monotonic
         beside.start(order.mode)
         stage.let_go()
         _loop(order, beside, ticking, hear.log, show, end)
@@ -275,7 +277,7 @@ def _bring(
         if now.time - there >= QUIET:
             return
         if now.time - first > PATIENCE:
-            beside.give_up(Fault.START, f"nobody brought it where it is to be held within {PATIENCE:g} s.")
+            beside.give_up(Fault.START, f"it was not brought where it is to be stabilised within {PATIENCE:g} s.")
         show(RunState(phase=stage.advice or "waiting", time=now.time, tick=now.tick, mode=now.mode))
 
 

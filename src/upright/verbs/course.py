@@ -67,7 +67,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml they are made on the rig itself; you are asked for what no drive can do.
+    With a RIG.toml they are made on the rig itself; you are prompted for what no drive can do.
 
     upright lab
     upright lab --rig linear --seed 3
@@ -201,16 +201,14 @@ def _live(
     if rig.startswith("serial:"):
         path = write_templates(folder, rig.removeprefix("serial:"))
         raise BadInput(
-            "a rig of hardware needs a description and limits, which nobody else can know: fill in "
+            "a rig of hardware needs a description and limits, which only you know: fill in "
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
-        raise BadInput(
-            "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."
-        )
+        raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")
     return live
 
 
@@ -342,7 +340,7 @@ def survey(
         if n is not None:
             raise BadInput(f"--n is for printed summaries; '{name}' holds single answers, which are counted.")
     elif n is None:
-        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they are said to rest on.")
+        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they rest on.")
     again = f"{command}{'' if n is None else f' --n {n}'} --json"
     page = chapter(
         sheet, title=f"Survey: {Path(name).stem.replace('_', ' ')}", source=name, answers=n, scale=limits,

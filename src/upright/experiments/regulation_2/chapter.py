@@ -297,7 +297,7 @@ def _way_table(result: Regulation) -> Table:
 def _parts(result: Regulation) -> list[Part]:
     tilt, push = math.degrees(result.task.start[2]), result.task.start[3]
     rig = result.rig
-    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "steps that nobody stated"
+    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "unspecified steps"
     sources = (
         f"{rig.name}, sampled every {1e3 * rig.period:.3g} ms; the command has a limit of {rig.limit:g} {rig.unit}, "
         f"{steps}, and acts {1e3 * rig.delay:.2g} ms late with a lag of "

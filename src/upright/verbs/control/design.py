@@ -180,8 +180,8 @@ def _sampling(model: StateSpace, period: float | str | None) -> float:
         raise BadInput('these matrices are continuous, and a computer closes the loop: say how often, --period "2 ms".')
     if requested is not None and model.dt and not math.isclose(requested, model.dt, rel_tol=1e-9):
         raise BadInput(
-            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * requested:.6g} ms was "
-            "asked for; leave --period out, or give a continuous model."
+            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * requested:.6g} ms is "
+            "requested; leave --period out, or give a continuous model."
         )
     return model.dt or requested or 0.0
 
