@@ -218,7 +218,7 @@ def test_init_does_not_overwrite_unless_told(bench):
         (["identify", "study.toml", "--method", "simplx"], "did you mean 'simplex'?"),
         (["identify", "study.toml", "-o", "one.csv"], "one.csv is a file"),
         (["identify", "study.toml", "--data", "nowhere"], "nowhere"),
-        (["identify", "known.toml"], "give a parameter a guess"),
+        (["identify", "known.toml"], "give one a guess"),
         (["identify", "unseen.toml"], "at least one needs role"),
         (["predict", "gone.json", "study.toml"], "upright predict OUT/fit.json STUDY.toml"),
         (["predict", "study.toml", "study.toml"], "no fit.json"),
