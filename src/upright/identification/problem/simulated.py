@@ -197,14 +197,17 @@ def restart_states(
     x = np.zeros((states + len(still), count, lanes))
     x[:states] = plan.equilibrium[:, None, None]
     x[columns] = measured[:, begin]
+    stepping = solver.stepping(table, x[:states].reshape(states, -1), track.u)
     place = np.full(last + 1, -1)
     place[track.restarts] = np.arange(track.restarts.size)
     out = np.full((len(x), track.restarts.size, lanes), np.nan)
     with np.errstate(over="ignore", invalid="ignore"):  # a lane that runs away is told by its NaN
         for j in range(1, steps):
-            table[drift] = still + x[states:].reshape(len(still), -1)
-            motion = solver.run(table, x[:states].reshape(states, -1), track.u, samples=2, start=start + (j - 1))
-            x[:states] = motion[1].reshape(states, count, lanes)
+            stepping.params[drift] = still + x[states:].reshape(len(still), -1)
+            stepping.state[:] = x[:states].reshape(states, -1)
+            stepping.start[:] = start + (j - 1)
+            stepping.go()
+            x[:states] = stepping.after.reshape(states, count, lanes)
             now = np.minimum(begin + j, last)
             innovation = measured[:, now]
             innovation -= x[columns]
