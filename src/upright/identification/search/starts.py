@@ -154,16 +154,6 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
     if held:
         f = f - np.einsum("tij,jt->ti", M[:, :, held], sample.a[held])
         M, f = M[:, free][:, :, free], f[:, free]
-    return _solved(M, f)
-
-
-def _solved(M: Array, f: Array) -> Array:
-    """Accelerations (n, N) of ``M a = f``, of one and two coordinates by Cramer's rule."""
-    if f.shape[1] == 1:
-        return (f[:, 0] / M[:, 0, 0])[None]
-    if f.shape[1] == 2:
-        (a, b), (c, d) = M[:, 0].T, M[:, 1].T
-        return np.stack([d * f[:, 0] - b * f[:, 1], a * f[:, 1] - c * f[:, 0]]) / (a * d - b * c)
     return np.asarray(np.linalg.solve(M, f[:, :, None])[:, :, 0].T, dtype=np.float64)
 
 
