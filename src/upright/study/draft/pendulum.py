@@ -254,7 +254,7 @@ def _gain(found: Recognised) -> float:
     """Force per command of the right size: what the start inertia needs to swing as far as was seen."""
     assert found.drive is not None
     c = next(iter(found.columns.values()))
-    swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": 0.017}.get(c.guess, 1.0)
+    swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": math.pi / 180}.get(c.guess, 1.0)
     u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
     u *= command_unit(found.drive)[1]
     w = found.frequency or 6.0
