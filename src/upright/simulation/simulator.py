@@ -199,7 +199,6 @@ class Simulator:
         """
         width = 1 if params.shape[1] == 1 else WIDTH
         call = self.call(params, x0, u, samples=2, width=width)
-        _, P, X0, _, _, begin, _, base, *_ = call.arguments
         compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
         events = self._kernel.events if self.flavour.dry else 0
         working = aligned(call.room)
@@ -208,12 +207,12 @@ class Simulator:
 
         def go() -> None:
             for k, row in locked:
-                base[k] = X0[row]
+                call.base[k] = call.x0[row]
             compiled(0, call.blocks, *call.arguments, working, events)
 
         lanes = call.lanes
-        return Stepping(params=P[:, :lanes], state=X0[:, :lanes], start=begin[:lanes], after=call.out[1, :, :lanes],
-                        go=go)  # fmt: skip
+        return Stepping(params=call.params[:, :lanes], state=call.x0[:, :lanes], start=call.start[:lanes],
+                        after=call.out[1, :, :lanes], go=go)  # fmt: skip
 
     def run(
         self,
@@ -378,7 +377,8 @@ class Simulator:
                 lanes, P, X0, u, self._reference, begin, self._grid, base, 0, steps + 1, steps, int(every),
                 int(self.substeps), float(self.dt), scalars, buffer, out, reduced,
             ),
-            lanes=lanes, blocks=blocks, out=out, reduced=reduced, room=room(self._layout, width, buffer),
+            params=P, x0=X0, start=begin, base=base, lanes=lanes, blocks=blocks, out=out, reduced=reduced,
+            room=room(self._layout, width, buffer),
         )  # fmt: skip
 
 
@@ -390,6 +390,8 @@ class Call:
     ----------
     arguments : tuple of int, float or array
         Those of `lanes.RUN_ARGUMENTS` from ``_total`` to ``STAT``.
+    params, x0, start, base : array
+        Those of the arguments that say what is moved, from where, when, and where locked coordinates stay.
     lanes, blocks : int
         Lanes, and blocks of them.
     out, reduced : array
@@ -399,6 +401,10 @@ class Call:
     """
 
     arguments: tuple[int | float | Array | NDArray[np.int64], ...]
+    params: Array
+    x0: Array
+    start: NDArray[np.int64]
+    base: Array
     lanes: int
     blocks: int
     out: Array
