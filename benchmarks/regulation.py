@@ -9,7 +9,7 @@ Poles are one of Table 1's sets, velocities come from plain or filtered differen
 to 5 V and the command up to 4 ms late. The start (tilt and tap in some proportion) lies about the edge of what the
 identified model recovers. The chance comes from 200 rigs drawn from the covariance, each with its own dry friction of
 the day and its own error of the hand; then the law runs on the true rig, with true friction of its day and one hand.
-Twins of a third kind have physics that the model lacks (`upright.experiments.worn`: friction larger close to rest,
+Twins of a third kind have physics that the model lacks (`upright.experiments.nonideal`: friction larger close to rest,
 ripple, latency, a frame out of level, encoders with play and off centre), and their fits leave many times their errors
 unexplained. Where a twin is identified as in 1b, the chance is that of `upright regulate`: over the fit's covariance,
 the friction law close to rest and the day.
@@ -144,8 +144,8 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
     from upright.control.score import outcomes
     from upright.designing.run import SPEEDS, velocities
     from upright.experiments.frequency_1b.run import run_frequency
+    from upright.experiments.nonideal import nonideal
     from upright.experiments.regulation_2.run import SETS
-    from upright.experiments.worn import worn
     from upright.gains.requests import read_poles
     from upright.rig.completion import completed
     from upright.rig.makes import make_rig
@@ -161,7 +161,7 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
         others = of_the_day(rig.plant, drawn(rig, names, covariance, rng, LANES), rng, LANES)
     else:
         limit, truth = truth.limit, make_rig(make, seed)
-        truth = worn(truth, seed) if flawed else truth
+        truth = nonideal(truth, seed) if flawed else truth
         run_frequency(truth, seed, swept)
         known = read_stored_rig(swept / "fit.json", seed=seed, draws=LANES)
         truth, rig = truth.replace(limit=limit), completed(known).replace(limit=limit)

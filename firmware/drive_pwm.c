@@ -13,45 +13,48 @@
 
 const uint16_t port_steps = STEPS;
 
-#define FORWARD_ON _BV(COM4B1)  /* OC4B high until its compare match */
+#define FORWARD_ON _BV(COM4B1) /* OC4B high until its compare match */
 #define REVERSE_ON _BV(COM4C1)
+#if DRIVE == DRIVE_PAIR
+#define ALL_LOW() (LOW(FORWARD), LOW(REVERSE))
+_Static_assert(BIT(FORWARD) == 4 && BIT(REVERSE) == 5, "OC4B and OC4C");
+#else
+#define ALL_LOW() (LOW(PWM), LOW(SIDE_A), LOW(SIDE_B))
+_Static_assert(BIT(PWM) == 4, "OC4B");
+#endif
 
 void port_command(int16_t steps) {
+    static int16_t last;
+    if (steps > STEPS) steps = STEPS;
+    if (steps < -STEPS) steps = -STEPS;
     uint32_t before = port_lock();
-    uint16_t size = (uint16_t)(steps < 0 ? -steps : steps);
-    static int8_t side; /* to which it pushes */
-    int8_t now = steps > 0 ? 1 : steps < 0 ? -1 : 0;
-    if (size > STEPS) size = STEPS;
-    if (now != side) TCCR4A = _BV(WGM41); /* off at once, before the other side is on */
-    if (size) {
-#if DRIVE == DRIVE_PAIR
-        if (now > 0) OCR4B = size - 1;
-        else OCR4C = size - 1;
-        TCCR4A = _BV(WGM41) | (now > 0 ? FORWARD_ON : REVERSE_ON);
-#else
-        if (now != side) {
-            if (now > 0) LOW(SIDE_B), HIGH(SIDE_A);
-            else LOW(SIDE_A), HIGH(SIDE_B);
+    if (steps != last || !steps) {
+        bool turns = !steps || (steps > 0) != (last > 0) || (steps < 0) != (last < 0);
+        uint16_t high = (uint16_t)(steps < 0 ? -steps : steps) - 1; /* until its compare match, from the next period on */
+        if (turns) { /* off at once, before the other side is on; pins that no timer holds show their low output */
+            TCCR4A = _BV(WGM41);
+            ALL_LOW();
         }
-        OCR4B = size - 1;
-        TCCR4A = _BV(WGM41) | FORWARD_ON;
+#if DRIVE == DRIVE_PAIR
+        if (steps > 0) OCR4B = high, TCCR4A = _BV(WGM41) | FORWARD_ON;
+        if (steps < 0) OCR4C = high, TCCR4A = _BV(WGM41) | REVERSE_ON;
+#else
+        if (turns && steps > 0) HIGH(SIDE_A);
+        if (turns && steps < 0) HIGH(SIDE_B);
+        if (steps) OCR4B = high, TCCR4A = _BV(WGM41) | FORWARD_ON;
 #endif
+        last = steps;
     }
-#if DRIVE == DRIVE_SIGN
-    else LOW(SIDE_A), LOW(SIDE_B);
-#endif
-    side = now;
     port_unlock(before);
 }
 
 bool port_settled(void) { return true; } /* pins are low before the call ends */
 
 void drive_prepare(void) {
+    ALL_LOW();
 #if DRIVE == DRIVE_PAIR
-    LOW(FORWARD), LOW(REVERSE);
     OUTPUT(FORWARD), OUTPUT(REVERSE);
 #else
-    LOW(PWM), LOW(SIDE_A), LOW(SIDE_B);
     OUTPUT(PWM), OUTPUT(SIDE_A), OUTPUT(SIDE_B);
 #endif
     ICR4 = STEPS - 1;

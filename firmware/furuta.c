@@ -24,6 +24,7 @@ static const struct {
     {"k_psi", offsetof(furuta_t, k_psi), false},
     {"gain", offsetof(furuta_t, gain), true},
     {"step", offsetof(furuta_t, step), true},
+    {"dead", offsetof(furuta_t, dead), false},
     {"counts_psi", offsetof(furuta_t, counts[0]), true},
     {"counts_theta", offsetof(furuta_t, counts[1]), true},
     {"psi", offsetof(furuta_t, x[0]), false},

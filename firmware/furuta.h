@@ -1,5 +1,6 @@
 /* Furuta pendulum on a drive, to test firmware on: eq. (3) of ASEE 2006-1008 with viscous friction, theta = 0 hanging.
- * Every number comes from whoever starts it; none is assumed, but that nothing anchors the arm. */
+ * Every number comes from whoever starts it; none is assumed, but that nothing anchors the arm and that the drive has no
+ * dead zone. */
 #ifndef FURUTA_H
 #define FURUTA_H
 #include <stdbool.h>
@@ -9,6 +10,7 @@ typedef struct {
     double k_psi;     /* anchors the arm to ground; 0 when nobody says */
     double gain;      /* torque per unit of command */
     double step;      /* command of one step of the converter */
+    double dead;      /* command that the drive swallows to either side; 0 when nobody says */
     double counts[2]; /* per rad */
     double x[4];      /* psi, psi', theta, theta' */
     bool running;     /* until the first run the rig is held where it is */

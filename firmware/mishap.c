@@ -32,10 +32,11 @@ uint8_t over_the_wire(mishaps_t *now, uint8_t byte) {
     return chance < now->corruption ? byte ^ (uint8_t)(1u << (next_random(now) >> 61)) : byte;
 }
 
-void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, int command, double dt) {
+void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, double command, double dt) {
     if (!rig->running) return;
-    hand_moves(&now->hand, rig, on, command, dt);
-    furuta_move(rig, on ? rig->gain * rig->step * command : 0, dt);
+    hand_moves(&now->hand, rig, on, command != 0, dt);
+    double size = fabs(rig->step * command) - rig->dead; /* beyond what the drive swallows */
+    furuta_move(rig, on && size > 0 ? rig->gain * copysign(size, command) : 0, dt);
 }
 
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {

@@ -34,5 +34,5 @@ uint8_t over_the_wire(mishaps_t *now, uint8_t byte);
  * false for a line that is none of them. */
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line);
 /* A step of the rig with a hand at it, the drive on or off at a command in steps of its converter. */
-void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, int command, double dt);
+void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, double command, double dt);
 #endif

@@ -81,11 +81,15 @@ void port_enable(bool on) {
 }
 
 static void show(uint32_t tick) {
+    static enum mode shown = FAULT;
     enum mode mode = rig_mode();
     if (mode == FAULT) {
         if (!(tick & (BLINK_TICKS - 1))) TOGGLE(LED);
-    } else if (mode == IDLE) LOW(LED);
-    else HIGH(LED);
+    } else if (mode != shown) {
+        if (mode == IDLE) LOW(LED);
+        else HIGH(LED);
+    }
+    shown = mode;
 }
 
 /* The host. */
@@ -157,6 +161,7 @@ ISR(TIMER1_COMPA_vect) {
 static uint8_t cause_at_reset __attribute__((section(".noinit")));
 void before_main(void) __attribute__((naked, used, section(".init3")));
 void before_main(void) {
+    OUTPUT(POWER_STAGE); /* low, as every output is by now */
     cause_at_reset = MCUSR;
     MCUSR = 0;
     wdt_disable();
@@ -172,7 +177,6 @@ void before_main(void) {
 
 int main(void) {
     reset_cause = cause_at_reset;
-    OUTPUT(POWER_STAGE);
     OUTPUT(LED);
     drive_prepare();
     UCSR0A = _BV(U2X0);

@@ -46,7 +46,7 @@ static mishaps_t mishaps;
 static uint32_t counter[CHANNELS];
 static uint16_t illegal;
 static int16_t command;
-static uint32_t tick;
+static uint32_t tick, passed; /* of the board, and since its process began */
 
 uint32_t port_counts(uint8_t channel) { return counter[channel]; }
 uint16_t port_illegal(void) { return illegal; }
@@ -80,6 +80,7 @@ static void pass(uint32_t ticks, uint16_t late) {
         shown[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i));
         counter[i] += (uint32_t)(shown[i] - before); /* on from wherever a wrap has put it */
     }
+    passed += ticks;
     rig_tick(tick += ticks, late);
     rig_poll();
 }
@@ -105,7 +106,7 @@ static void obey(const char *line) {
     } else if (sscanf(line, "skip %ld", &a) == 1 && port_virtual && a > 0) {
         pass((uint32_t)a, 0);
     } else if (!strcmp(line, "state")) {
-        printf("%u %.17g %.17g %.17g %.17g %d %d %d\n", tick, plant.x[0], plant.x[1], plant.x[2], plant.x[3], command,
+        printf("%u %.17g %.17g %.17g %.17g %d %d %d\n", passed, plant.x[0], plant.x[1], plant.x[2], plant.x[3], command,
                enabled, rig_mode());
         fflush(stdout);
         return;
@@ -178,7 +179,7 @@ int main(int count, char **arguments) {
     for (;;) {
         struct timespec wait = {0, 0}, *until_tick = port_virtual ? NULL : &wait;
         if (!port_virtual) {
-            int64_t since = nanoseconds() - start - (int64_t)tick * PERIOD_NS;
+            int64_t since = nanoseconds() - start - (int64_t)passed * PERIOD_NS;
             if (since >= PERIOD_NS) {
                 uint32_t ticks = (uint32_t)(since / PERIOD_NS);
                 int64_t late = since % PERIOD_NS / 1000;

@@ -308,7 +308,8 @@ static uint8_t *put_limits(uint8_t *b) {
 
 static uint8_t arm(void) {
     if (!configured) return NOT_CONFIGURED;
-    while (!port_settled()) {} /* at the zero of every tick, before the power stage is on */
+    port_command(0);
+    while (!port_settled()) {} /* the power stage is on after that */
     uint32_t before = port_lock();
     bool off = false;
     for (uint8_t i = 0; i < CHANNELS; i++) off |= beyond(size_of(now.q[i]), limits.start[i]);

@@ -1,6 +1,9 @@
-/* The ATmega2560's firmware on simavr with a Furuta pendulum: quadrature edges in, SPI converter and enable line out.
+/* The ATmega2560's firmware on simavr with a Furuta pendulum: quadrature edges in, SPI converter or PWM, and the enable
+ * line out.
  *
- *     simrig atmega2560.elf m_p=0.2 l_cg=0.15 ...     every number of furuta.h
+ *     simrig atmega2560-analog.elf m_p=0.2 l_cg=0.15 ...        every number of furuta.h
+ *     simrig atmega2560-pair.elf pair m_p=0.2 l_cg=0.15 ...     an H-bridge: the drive gets what its inputs say edge by
+ *     simrig atmega2560-sign.elf sign m_p=0.2 l_cg=0.15 ...     edge, nothing while its enable line is low
  *
  * Virtual time in lockstep: a frame from the host starts it, and it stands still when the answer has left, so that
  * runs are the same to the last bit whatever else the machine does. A frame that the firmware will not answer, because
@@ -8,13 +11,19 @@
  * Lines on standard input, each answered: those of mishap.h, and
  *     wrap CHANNEL V  the counter's own number, without that anything moved
  *     illegal         both phases of encoder 1 change at once
+ *     reset           the processor starts anew, as after a dip of its supply; a resistor holds the enable line low
  *     hang            the processor stops in a loop with its interrupts off
  *     run TICKS       time passes without the host
+ *     glitch STEPS    the converter puts out something else than it was commanded
+ *     met             answers: converter as the enable line went up last [steps]
+ *     pwm             answers, of the H-bridge's edges since it was last asked: shortest and longest time from one rise to
+ *                     the next [cycles], cycles that it pushed forward, backward, and both ways at once
  *     state           answers: milliseconds, psi, psi', theta, theta', converter [steps], enable line, the longest
  *                     tick since it was last asked [cycles]
  * It ends with its standard input. */
 #define _GNU_SOURCE
 #include <fcntl.h>
+#include <math.h>
 #include <poll.h>
 #include <pty.h>
 #include <stdarg.h>
@@ -53,12 +62,45 @@ static uint32_t tick_entry;        /* of its tick's interrupt */
 static uint8_t spi[3];
 static int spi_bytes, selected;
 static int16_t converter;
+static double pushed; /* over the last slice [steps] */
 static int enabled;
+static int16_t met; /* by the enable line as it went up [steps] */
 static uint64_t slices;
 static bool answered, uart_ready = true;
 static uint8_t answer[4096];
 static size_t answer_bytes;
 static avr_cycle_count_t worst_tick;
+
+/* The H-bridge: which way its inputs push, since when, and for how long in this slice and since it was asked for. */
+enum { NONE, PAIR, SIGN };
+static int bridge;
+static uint32_t input[3];
+static avr_cycle_count_t since, rose;
+static int64_t pushes[2];
+static struct { int64_t forward, backward, both, shortest, longest; } edges;
+#define PWM_STEPS 800
+
+static void push_until_now(void) {
+    bool a = bridge == PAIR ? input[0] : input[0] && input[1], b = bridge == PAIR ? input[1] : input[0] && input[2];
+    int64_t passed = (int64_t)(avr->cycle - since);
+    since = avr->cycle;
+    if (!enabled) return;
+    if (a) pushes[0] += passed, edges.forward += passed;
+    if (b) pushes[1] += passed, edges.backward += passed;
+    if (a && b) edges.both += passed;
+}
+static void bridge_input(struct avr_irq_t *irq, uint32_t high, void *which) {
+    (void)irq;
+    intptr_t i = (intptr_t)which;
+    if (input[i] == (high != 0)) return;
+    push_until_now();
+    input[i] = high != 0;
+    if (!high || (bridge == SIGN && i)) return;
+    int64_t period = (int64_t)(avr->cycle - rose);
+    rose = avr->cycle;
+    if (!edges.shortest || period < edges.shortest) edges.shortest = period;
+    if (period > edges.longest) edges.longest = period;
+}
 
 static void sent(struct avr_irq_t *irq, uint32_t byte, void *unused) {
     (void)irq, (void)unused;
@@ -86,6 +128,8 @@ static void sync_line(struct avr_irq_t *irq, uint32_t high, void *unused) {
 }
 static void enable_line(struct avr_irq_t *irq, uint32_t high, void *unused) {
     (void)irq, (void)unused;
+    if (bridge) push_until_now();
+    if (high && !enabled) met = converter;
     enabled = high != 0;
     plant.running |= enabled;
 }
@@ -117,19 +161,25 @@ static void run_until(avr_cycle_count_t cycle) {
 
 static void slice(void) {
     static const double dt = (double)SLICE / CLOCK;
-    mishaps_move(&mishaps, &plant, enabled, converter, dt);
-    long edges[2], most = 1;
+    if (bridge) {
+        push_until_now();
+        pushed = (double)(pushes[0] - pushes[1]) * PWM_STEPS / SLICE;
+        converter = (int16_t)lround(pushed);
+        memset(pushes, 0, sizeof pushes);
+    } else pushed = converter;
+    mishaps_move(&mishaps, &plant, enabled, pushed, dt);
+    long steps[2], most = 1;
     for (int i = 0; i < 2; i++) {
-        edges[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];
-        if (labs(edges[i]) > EDGES_PER_SLICE) edges[i] = edges[i] < 0 ? -EDGES_PER_SLICE : EDGES_PER_SLICE;
-        if (labs(edges[i]) > most) most = labs(edges[i]);
+        steps[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];
+        if (labs(steps[i]) > EDGES_PER_SLICE) steps[i] = steps[i] < 0 ? -EDGES_PER_SLICE : EDGES_PER_SLICE;
+        if (labs(steps[i]) > most) most = labs(steps[i]);
     }
     avr_cycle_count_t start = (avr_cycle_count_t)slices * SLICE;
     for (long k = 1; k <= most; k++) {
         run_until(start + (avr_cycle_count_t)(SLICE * k / (most + 1)));
         for (int i = 0; i < 2; i++)
-            if (k <= labs(edges[i])) {
-                position[i] += edges[i] < 0 ? -1 : 1;
+            if (k <= labs(steps[i])) {
+                position[i] += steps[i] < 0 ? -1 : 1;
                 show(i);
             }
     }
@@ -161,6 +211,23 @@ static void obey(const char *line) {
         position[0] += 2;
         mishaps.encoder[0].shown += 2;
         show(0);
+    } else if (sscanf(line, "glitch %ld", &a) == 1) {
+        converter = (int16_t)a;
+    } else if (!strcmp(line, "met")) {
+        printf("%d\n", met);
+        fflush(stdout);
+        return;
+    } else if (!strcmp(line, "pwm")) {
+        push_until_now();
+        printf("%lld %lld %lld %lld %lld\n", (long long)edges.shortest, (long long)edges.longest,
+               (long long)edges.forward, (long long)edges.backward, (long long)edges.both);
+        memset(&edges, 0, sizeof edges);
+        fflush(stdout);
+        return;
+    } else if (!strcmp(line, "reset")) {
+        if (bridge) push_until_now();
+        enabled = 0;
+        avr_reset(avr);
     } else if (!strcmp(line, "hang")) {
         hang();
     } else if (sscanf(line, "run %ld", &a) == 1) {
@@ -269,14 +336,17 @@ static void make_board(const char *file) {
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_SPI_GETIRQ(0), SPI_IRQ_OUTPUT), spi_byte, NULL);
     avr_irq_register_notify(pin('B', 0), sync_line, NULL);
     avr_irq_register_notify(pin('G', 5), enable_line, NULL);
+    for (intptr_t i = 0; bridge && i < 3; i++) avr_irq_register_notify(pin('H', 4 + (int)i), bridge_input, (void *)i);
     for (int i = 0; i < 4; i++) phase[i / 2][i % 2] = pin('B', 4 + i);
 }
 
 int main(int count, char **arguments) {
-    if (count < 2) return fprintf(stderr, "simrig atmega2560.elf name=value ...\n"), 2;
+    if (count < 2) return fprintf(stderr, "simrig atmega2560-analog.elf name=value ...\n"), 2;
     furuta_prepare(&plant);
     for (int i = 2; i < count; i++)
-        if (!furuta_set(&plant, arguments[i])) return fprintf(stderr, "%s is not understood\n", arguments[i]), 2;
+        if (!strcmp(arguments[i], "pair")) bridge = PAIR;
+        else if (!strcmp(arguments[i], "sign")) bridge = SIGN;
+        else if (!furuta_set(&plant, arguments[i])) return fprintf(stderr, "%s is not understood\n", arguments[i]), 2;
     if (furuta_missing(&plant)) return fprintf(stderr, "%s is missing\n", furuta_missing(&plant)), 2;
     mishaps_prepare(&mishaps, &plant);
     frame_prepare();

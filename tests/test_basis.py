@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from upright.basis import DESCRIBED, LEVELS, REFUSAL, SIMULATED, Basis, of_plain
+from upright.basis import DESCRIBED, LEVELS, NOT_SUPPORTED, REFUSAL, SIMULATED, Basis, in_percent, of_plain
 from upright.report.page import Chapter, resting_on
 
 EACH = [Basis(level=level, sentence=f"Model {i} is {level}.") for i, level in enumerate(LEVELS)]
@@ -46,3 +46,17 @@ def test_a_file_gives_back_its_basis_and_one_without_is_not_trusted():
         silent = of_plain(content, "this design")
         assert silent.level == "not trusted"
         assert silent.sentence == "This design does not say whether it can be trusted."
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(1.0, "100 %"), (0.995, "99.5 %"), (0.9999, "above 99.9 %"), (0.5, "50 %"), (0.005, "0.5 %"), (0.0, "0 %"),
+     (2e-4, "below 0.1 %")],
+)  # fmt: skip
+def test_only_what_is_whole_is_called_a_hundred_percent(share, said):
+    assert in_percent(share) == said
+
+
+@pytest.mark.parametrize("basis", EACH)
+def test_a_probability_is_supported_unless_its_model_is_not_trusted(basis):
+    assert basis.supported(0.5) == (NOT_SUPPORTED if basis.level == "not trusted" else 0.5)

@@ -41,17 +41,18 @@ identification
 rig
 study
 study.draft
-control live
+control
 rigs
 realtime
 report
 report.fit
 report.ladder report.law report.log report.rig
 report.run
+live
 diagnosis questionnaire designing
 paper
 running
-experiments.abreast
+experiments.parallel
 experiments.stand
 experiments.weighing_1a
 experiments.frequency_1b

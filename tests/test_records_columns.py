@@ -18,6 +18,7 @@ from upright.records.columns import bare_name, stated_unit, take_time, time_scal
         ("time [ms]", 1e-3), ("Time (s)", 1), ("t [ us ]", 1e-6), ("t(\u00b5s)", 1e-6), ("t_\u03bcs", 1e-6),
         ("t [ns]", 1e-9), ("time [min]", 0), ("t_us", 1e-6), ("time_ms", 1e-3),
         ("timestamp_ns", 1e-9), ("t_sec", 1), ("t_x", 0), ("theta", 0), ("theta_s", 0),
+        ("Zeit (ms)", 1e-3), ("temps", 1), ("ms", 1e-3), ("\u00b5s", 1e-6), ("s", 0),  # s may be a position
         ("", 0), ("x [ms]", 0), ("t" + " " * 199, 1),
     ],
 )  # fmt: skip
@@ -29,7 +30,7 @@ def test_a_column_is_a_time_by_its_name_and_its_unit(name, scale):
     ("name", "unit"),
     [
         ("theta [rad]", "rad"), ("u (V)", "V"), ("a [b] [deg]", "deg"), ("x [ mm ] ", "mm"), ("x [bogus]", ""),
-        ("x", ""),
+        ("x", ""), ("Pendel (\u00b0)", "deg"), ("arm [degrees]", "deg"), ("angle [Radians]", "rad"),
         ("x [V] raw", ""), ("k" * 300 + " [V]", "V"),
     ],
 )  # fmt: skip

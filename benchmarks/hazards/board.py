@@ -12,12 +12,14 @@ import numpy as np
 from benchmarks.hazards.story import SAFE, Column, Happened, Story, Telling, in_loop
 from upright.errors import RigStopped
 from upright.rigs import Mode
-from upright.rigs.board import told
+from upright.rigs.board import fault_text
 from upright.rigs.onboard import OnboardLaw, onboard
 from upright.rigs.wire import Kind, exchange, pack
 
 HALF_TURN = 8000
 """Counts from hanging to upright."""
+BOOTED = 0.01
+"""By which a board that starts anew ticks [s]."""
 HUNG = 0.03
 """Longer than the processor's own watchdog takes [s]."""
 
@@ -68,6 +70,31 @@ def hangs(story: Story) -> None:
     story.tick = story.beside.rig.exchange(0.0)
 
 
+def starts_anew(story: Story) -> None:
+    """The board's supply dips, and comes back at once."""
+    story.on.board.do("reset")
+    story.on.silence(BOOTED)
+    story.tick = story.beside.rig.exchange(0.0)
+
+
+def hears_it_all_again(*, reset: bool) -> Callable[[Story], None]:
+    """All that the host sent until now comes again, greeting, ARM and START included, to a board that was stopped."""
+
+    def again(story: Story) -> None:
+        sent = list(story.on.line.sent)
+        if reset:
+            story.on.board.do("reset")
+            story.on.silence(BOOTED)
+        else:
+            story.beside.rig.stop()
+        for frame in sent:
+            story.on.line.write(frame)
+            story.on.line.read(0.0)
+        story.tick = story.beside.rig.exchange(0.0)
+
+    return again
+
+
 def in_a_buffer(story: Story) -> None:
     """Full command, which answers a sample of long ago, comes out of a buffer on its way."""
     old = story.tick.tick
@@ -103,7 +130,7 @@ def past_supervisor(law: Callable[[Any], Any], sent: Callable[[OnboardLaw], Onbo
             for _ in range(round(4.0 / column.period)):
                 story.tick = on.rig.exchange(0.0)
                 if story.tick.faults:
-                    raise RigStopped(f"{beside.about.name} stopped itself: {told(story.tick.faults)}.")
+                    raise RigStopped(f"{beside.about.name} stopped itself: {fault_text(story.tick.faults)}.")
             story.told = SAFE
         except RigStopped as stop:
             story.told = str(stop)

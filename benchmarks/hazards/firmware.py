@@ -63,6 +63,7 @@ class PatientLine:
     def __init__(self, on: FirmwareHazards, path: str) -> None:
         self.name, self.waited = "its port", 0.0
         self.spoils, self.spoiled, self.loses, self.cut = 0.0, 0, 0, False
+        self.sent: list[bytes] = []
         self._on, self._line = on, TerminalLine(path)
         self._rng = np.random.default_rng(5)
         self._expected = self._greeted = False
@@ -72,6 +73,7 @@ class PatientLine:
         return self.waited
 
     def write(self, data: bytes) -> None:
+        self.sent.append(data)
         (asked,) = Parser().feed(data)
         self._greeted = asked.kind == Kind.HELLO
         self._expected, self._asked, self._quiet = False, self._on.look(), 0.0

@@ -31,7 +31,7 @@ MAPS = 8
 """Maps kept of other trees."""
 START = 0.02
 """Seconds that the shortest test costs all the same."""
-BATCH = 24
+BATCH = 8
 """Files of slow tests that run before the map is kept."""
 
 

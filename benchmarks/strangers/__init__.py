@@ -6,7 +6,8 @@ back, an axis or rail out of level by up to 0.3 degrees, and at the run dry fric
 and 2 %). Each logs 12 s of steps while it hangs. The log is drafted; what a ruler, a scale and data sheets give is
 written into the draft (five edits), and what the verdict proposes; it is identified, designed for as `design` proposes,
 exported to C, and runs 12 times for 10 s from tilts within 4 degrees. Asked: 32 of 40 fits trusted, none of the trusted
-lost, a Brier score of the chance that was told within 0.01 of its expectation, and 10 s in all.
+lost, a Brier score of the probabilities that are given within 0.01 of its expectation, and 10 s in all. A fit that is
+not trusted supports none.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class Ending:
     seed: int
     ended: str
     trusted: bool = False
-    chance: float | None = None
+    chance: float | str = ""
+    """Probability of stabilisation, or that none is supported."""
     held: tuple[bool, ...] = ()
     effort: float | None = None
     """Root mean square of the command over that which was told."""
@@ -230,11 +232,11 @@ def met(rig: Stranger) -> Ending:
         off = {n: e.value / true[n] for n, e in fit.estimates.items() if true.get(n)}
         missed = tuple(
             n for n, e in fit.estimates.items()
-            if fit.trusted and e.status == "firm" and not e.rests_on and n in true
+            if fit.trusted and e.status == "well determined" and not e.rests_on and n in true
             and not e.interval[0] <= true[n] <= e.interval[1]
         )  # fmt: skip
         return Ending(
-            **about, ended="" if fit.trusted else fit.verdict, trusted=fit.trusted, chance=told.chance,
+            **about, ended="" if fit.trusted else fit.verdict, trusted=fit.trusted, chance=told.numbers["chance"],
             held=tuple(math.isinf(fell) for fell, *_ in runs), off=off, missed=missed, seconds=seconds,
             effort=float(np.median([effort for _, effort, *_ in runs])),
         )  # fmt: skip
@@ -269,7 +271,7 @@ def run(
 
 def told(endings: list[Ending]) -> str:
     """What became of them."""
-    designed = [e for e in endings if e.chance is not None]
+    designed = [e for e in endings if e.held]
     trusted = [e for e in designed if e.trusted]
     parts = [f"{len(trusted)} of {len(endings)} trusted"]
     if designed:
@@ -277,10 +279,10 @@ def told(endings: list[Ending]) -> str:
         parts.append(f"{sum(whole)} of {len(designed)} held {STARTS} times of {STARTS}, "
                      f"{held} of {STARTS * len(designed)} runs")  # fmt: skip
         parts.append(f"{sum(not all(e.held) for e in trusted)} of the trusted lost a run")
-        chances = np.array([e.chance for e in designed for _ in e.held])
-        came = np.array([h for e in designed for h in e.held])
+        given = [(e.chance, h) for e in designed for h in e.held if not isinstance(e.chance, str)]
+        chances, came = np.array(given, dtype=np.float64).reshape(-1, 2).T
         brier, expected = float(np.mean((chances - came) ** 2)), float(np.mean(chances * (1 - chances)))
-        parts.append(f"Brier {brier:.3f} (expected {expected:.3f})")
+        parts.append(f"Brier {brier:.3f} (expected {expected:.3f}) of {chances.size // STARTS} probabilities given")
     parts.append(f"{sum(len(e.missed) for e in trusted)} intervals of usable numbers miss the truth")
     parts.append(
         f"median {np.median([e.seconds for e in endings]):.2g} s, longest {max(e.seconds for e in endings):.2g} s"
@@ -290,10 +292,10 @@ def told(endings: list[Ending]) -> str:
 
 def _page(lines: list[Line], endings: list[Ending]) -> str:
     body = ["", "| rigs | what became of them |", "|---|---|", *(f"| {x.contender} | {x.note} |" for x in lines)]
-    body += ["", "| rig | trusted | chance told [%] | runs held | command rms [V] | time [s] | what was said |",
+    body += ["", "| rig | trusted | probability [%] | runs held | command rms [V] | time [s] | what was said |",
              "|---|---|---|---|---|---|---|"]  # fmt: skip
     for e in endings:
-        chance = "" if e.chance is None else f"{100 * e.chance:.0f}"
+        chance = e.chance if isinstance(e.chance, str) else f"{100 * e.chance:.0f}"
         held = f"{sum(e.held)} of {len(e.held)}" if e.held else ""
         effort = "" if e.effort is None else f"{e.effort:.2g}"
         said = e.ended.splitlines()[0].replace("|", "/")[:200] if e.ended else ""

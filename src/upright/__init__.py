@@ -17,12 +17,13 @@ text wears its unit: ``"12 deg"``.
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record
-Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_convert, log_replay
+Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_convert, log_replay;
+            firmware_build, firmware_flash, firmware_pins
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; every verb takes it
 Control     StateSpace, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design, export,
-            regulate, swing_up, track; Law, Rule
+            regulate, swing_up, track, play; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
 ==========  ==================================================================================================
@@ -61,11 +62,13 @@ if TYPE_CHECKING:
     from upright.systems import StateSpace
     from upright.verbs.control.chance import chance
     from upright.verbs.control.design import design
+    from upright.verbs.control.play import play
     from upright.verbs.control.regulate import regulate
     from upright.verbs.control.swing_up import swing_up
     from upright.verbs.control.track import track
     from upright.verbs.course import lab, reproduce, survey
     from upright.verbs.export import export
+    from upright.verbs.firmware import firmware_build, firmware_flash, firmware_pins
     from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, observer, place, prefilter
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
@@ -100,11 +103,13 @@ _HOMES = {
     "rig": ("Rig",),
     "verbs.control.chance": ("chance",),
     "verbs.control.design": ("design",),
+    "verbs.control.play": ("play",),
     "verbs.control.regulate": ("regulate",),
     "verbs.control.swing_up": ("swing_up",),
     "verbs.control.track": ("track",),
     "verbs.course": ("lab", "reproduce", "survey"),
     "verbs.export": ("export",),
+    "verbs.firmware": ("firmware_build", "firmware_flash", "firmware_pins"),
     "verbs.rig": ("rig_check", "rig_doctor", "run"),
     "verbs.log": ("doctor", "init", "law", "read", "show"),
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
@@ -123,10 +128,12 @@ __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rig", "Rule",
     "StateSpace",
-    "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export", "frequency", "hold",
+    "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export",
+    "firmware_build", "firmware_flash", "firmware_pins", "frequency", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
-    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "predict", "prefilter", "quantity", "read",
-    "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up", "track",
+    "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "play", "predict", "prefilter", "quantity",
+    "read", "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up",
+    "track",
 ]  # fmt: skip
 
 

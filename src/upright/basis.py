@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 NOT_TRUSTED, RESERVED, TRUSTED = LEVELS = ("not trusted", "with reservations", "trusted")
 """From the worst to the best."""
 SIMULATED = "SIMULATED: no rig was driven."
 REPLAYED = "REPLAYED from a record: no rig was driven."
+NOT_SUPPORTED = "not supported"
+"""What stands where a probability would, of a rig whose model is not trusted."""
 REFUSAL = "Do not rely on this: its model is not trusted."
 
 
@@ -31,6 +35,15 @@ class Basis:
     def trusted(self) -> bool:
         """Whether nothing of the model stands against a verdict that rests on it."""
         return self.level == TRUSTED
+
+    @property
+    def supports(self) -> bool:
+        """Whether a probability of the rig can be given: simulations of a model that is not trusted tell of none."""
+        return self.level != NOT_TRUSTED
+
+    def supported(self, value: T) -> T | str:
+        """A probability, or a text of one, where the model supports it; `NOT_SUPPORTED` elsewhere."""
+        return value if self.supports else NOT_SUPPORTED
 
     def qualified(self, verdict: str) -> str:
         """A verdict that is no better than its model; one that says so already stays as it is."""
@@ -65,3 +78,14 @@ def of_plain(content: Any, what: str) -> Basis:
         if level in LEVELS and isinstance(sentence, str):
             return Basis(level=level, sentence=sentence)
     return Basis(level=NOT_TRUSTED, sentence=f"{what[:1].upper()}{what[1:]} does not say whether it can be trusted.")
+
+
+def in_percent(share: float) -> str:
+    """A share in percent that is called 100 or 0 % only where it is whole: 0.997 is 99.7 %, and 0.9997 above 99.9 %."""
+    if share in (0.0, 1.0):
+        return f"{100 * share:.0f} %"
+    if share > 0.999:
+        return "above 99.9 %"
+    if share < 0.001:
+        return "below 0.1 %"
+    return f"{100 * share:.1f} %" if not 0.01 <= share <= 0.99 else f"{100 * share:.0f} %"

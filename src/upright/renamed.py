@@ -18,6 +18,7 @@ LET_GO: Mapping[str, Now] = {
 }
 
 
+WORN: Mapping[str, Now] = {"worn": ("nonideal", lambda value: value)}
 CLUSTER: Mapping[str, Now] = {"cluster": ("workers", lambda value: value)}
 
 

@@ -24,7 +24,7 @@ SEEN: dict[str, Any] = {}
     ranges={"every": (1, 4)},
     hidden=("secret",),
     flags={"strict": Flag(help="Be strict."), "keys": Flag(help="Print keys.", prints=lambda: "all the keys")},
-    given=lambda typed: {**typed, "secret": 7},
+    prepare=lambda typed: {**typed, "secret": 7},
     wrong=lambda answer, strict, keys: strict and answer.numbers["every"] == 3,
 )
 def weigh(

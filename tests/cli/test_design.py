@@ -34,7 +34,7 @@ def study(tmp_path: Path) -> Path:
 def fit_file(folder: Path, stderr: float) -> Path:
     """A fit of the same rig on a drive of 0.5 N m/V, whose gain is known to `stderr`."""
     entries = {n: {"value": v, "stderr": 0.0, "unit": "", "status": "known"} for n, v in RIG.parameters().items()}
-    entries["actuator.gain"] = {"value": 0.5, "stderr": stderr, "unit": "N m/V", "status": "firm"}
+    entries["actuator.gain"] = {"value": 0.5, "stderr": stderr, "unit": "N m/V", "status": "well determined"}
     content = {
         "format": 1, "plant": "furuta", "verdict": "", "trusted": True, "parameters": entries,
         "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": {"entries": {
@@ -127,9 +127,9 @@ def test_a_lag_takes_effort_and_margin(study, tmp_path):
     ("fitted", "options", "samples", "said"),
     [
         (3e-3, (), 1.5, "as the file says"),  # 3 ms of 2 ms samples, and no sample of computing besides
-        (3e-3, ("--delay", "2"), 2.0, "as asked"),
+        (3e-3, ("--delay", "2"), 2.0, "as requested"),
         (0.0, (), 1.0, "assumed"),
-        (0.0, ("--delay", "0"), 0.0, "as asked"),
+        (0.0, ("--delay", "0"), 0.0, "as requested"),
     ],
 )
 def test_a_delay_is_counted_once_and_its_source_is_told(tmp_path, fitted, options, samples, said):

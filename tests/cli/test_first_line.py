@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from tests.gains.furuta import STUDY
 from upright.cli import app
+from upright.errors import BadInput
 from upright.rig.makes import make_rig
 
 NO = {
@@ -51,7 +52,7 @@ def fit_of(key: str, folder: Path, said: dict[str, Any]) -> Path:
     names = {"linear": "cart-pendulum", "furuta": "furuta", "rectilinear": "rectilinear-2"}
     entries = {n: {"value": v, "stderr": 0.0, "unit": "", "status": "known"} for n, v in rig.plant.parameters().items()}
     unit = "N m/V" if key == "furuta" else "N/V"
-    entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": unit, "status": "firm"}
+    entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": unit, "status": "well determined"}
     vendor = "ECP 205" if key == "furuta" else "ECP 210"
     content = {
         "format": 1, "plant": names[key], "parameters": entries, "estimated": ["actuator.gain"],
@@ -82,6 +83,27 @@ def test_a_fit_that_is_not_trusted_is_repeated_first_and_nothing_made_from_it_is
     assert told["first_line"] == first
     assert told["basis"]["level"] == "not trusted"
     assert told["verdict"].startswith(REFUSED)
+
+
+PROBABILITIES = {"chance", "interval", "quiet_chance", "chance_over_the_fit"}
+
+
+def probabilities(told: Any) -> list[Any]:
+    """Every probability that an answer holds, however deep."""
+    if isinstance(told, dict):
+        own = [value for key, value in told.items() if key in PROBABILITIES]
+        return own + [p for value in told.values() for p in probabilities(value)]
+    return [p for value in told for p in probabilities(value)] if isinstance(told, list) else []
+
+
+@pytest.mark.parametrize("said", [UNTRUSTED, TRUSTED], ids=["not trusted", "trusted"])
+@pytest.mark.parametrize("verb", ["design", pytest.param("regulate", marks=pytest.mark.slow)])
+def test_no_probability_of_the_rig_is_given_by_a_model_that_is_not_trusted(verb, said, tmp_path):
+    key, options, *_ = VERBS[verb]
+    told = json.loads(upright(verb, fit_of(key, tmp_path, said), *options, "-o", tmp_path, "--json").stdout)
+    found = probabilities(told)
+    assert found
+    assert all((p == "not supported") == (said is UNTRUSTED) for p in found)
 
 
 @pytest.mark.parametrize("verb", EACH_VERB)
@@ -197,3 +219,8 @@ def test_a_chance_is_simulated_and_no_better_than_its_fit(tmp_path):
     for words in ("SIMULATED", REFUSED, SAID):
         assert words in first
     assert not told.chapter.sound
+    assert "%" not in told.chapter.verdict
+    assert told.numbers["chance"] == told.numbers["interval"] == "not supported"
+    with pytest.raises(BadInput, match="no probability of stabilisation is supported"):
+        _ = told.value.chance
+    assert told.value.share == 0.0  # no gain holds the simulated pendulum

@@ -10,8 +10,6 @@ from typer.testing import CliRunner
 
 from upright.cli import app
 
-pytestmark = pytest.mark.slow
-
 
 def upright(*arguments: object):
     return CliRunner().invoke(app, [*map(str, arguments)], terminal_width=200)
@@ -21,6 +19,7 @@ def said(outcome) -> str:
     return " ".join((outcome.stdout + outcome.stderr).split())
 
 
+@pytest.mark.slow
 def test_a_twin_is_swept_and_its_log_tells_the_same(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     first = upright("frequency", "--rig", "linear", "--seed", 4, "-o", "out")

@@ -14,8 +14,6 @@ from upright.cli import app
 from upright.identification.ladder import growth as climb
 from upright.study.load import load_study
 
-pytestmark = pytest.mark.slow
-
 STUDY = """
 title = "A rod with a dry hinge"
 [rig]
@@ -62,6 +60,7 @@ def run(*arguments):
     return CliRunner().invoke(app, list(arguments))
 
 
+@pytest.mark.slow
 def test_a_ladder_says_what_it_chose_and_why(bench):
     outcome = run("ladder", "study.toml", "-o", "out")
     assert outcome.exit_code == 0, outcome.output
@@ -77,6 +76,7 @@ def test_a_ladder_says_what_it_chose_and_why(bench):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
+@pytest.mark.slow
 def test_the_chosen_study_asks_for_what_was_kept_and_can_be_fitted(bench):
     run("ladder", "study.toml", "-o", "out", "--no-report")
     chosen = load_study(bench / "out" / "study.toml", data=bench)
@@ -89,6 +89,7 @@ def test_the_chosen_study_asks_for_what_was_kept_and_can_be_fitted(bench):
     assert fit["parameters"]["b_2c"]["value"] == pytest.approx(4e-3, rel=0.1)
 
 
+@pytest.mark.slow
 def test_every_run_is_held_out_in_turn(bench):
     outcome = run("identify", "study.toml", "-o", "out", "--hold-out", "each")
     assert outcome.exit_code == 0, outcome.output
@@ -109,6 +110,7 @@ def test_one_run_cannot_be_held_out_of_itself(bench):
     assert "two runs" in outcome.output
 
 
+@pytest.mark.slow
 def test_ctrl_c_writes_the_rungs_so_far(bench, monkeypatch):
     whole = climb.climb
     monkeypatch.setattr(climb, "climb", lambda *a, **k: replace(whole(*a, **k), interrupted=True))

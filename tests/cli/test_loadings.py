@@ -12,8 +12,6 @@ from typer.testing import CliRunner
 from upright.cli import app
 from upright.experiments.weighing_1a.run import drawn_twin, step_log
 
-pytestmark = pytest.mark.slow
-
 
 def upright(*arguments: object):
     return CliRunner().invoke(app, [*map(str, arguments)], terminal_width=200)
@@ -31,6 +29,7 @@ def logs(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_twin_is_weighed_and_its_logs_tell_the_same(tmp_path, monkeypatch):
     outcome = upright("loadings", "--twin", "rectilinear", "--seed", 4, "-o", tmp_path / "out")
     assert outcome.exit_code == 0, outcome.stderr
@@ -47,6 +46,7 @@ def test_the_twin_is_weighed_and_its_logs_tell_the_same(tmp_path, monkeypatch):
     assert {s["omega_n"] for s in second["swings"]} == {s["omega_n"] for s in first["swings"]}
 
 
+@pytest.mark.slow
 def test_masses_on_a_bolt_circle_are_inertias(logs, tmp_path):
     files = [logs / f"{n}.csv" for n in (0, 2, 4)]
     added = ["--added", "0", "--added", "2 at 6.5 cm", "--added", "4 at 65 mm"]

@@ -29,6 +29,7 @@ OTHERS = {
 }  # fmt: skip
 """Options of arduino-cli, Octave, MuJoCo, FMPy, git and Dask."""
 SHOWN_BY = {
+    "rigs/firmware": "firmware flash",
     "rigs": "run", "realtime": "run", "running/run.py": "run", "running/rig.py": "run",
     "designing": "design", "experiments/regulation_2": "regulate", "experiments/swing_up_2b": "swing-up",
     "experiments/tracking_3": "track", "experiments/frequency_1b": "frequency", "study/draft": "init",
@@ -47,7 +48,7 @@ def options(command: str) -> set[str]:
 
 
 OPTIONS = {name: options(name) for name in [*COMMANDS, *(f"{a} {b}" for a, bs in NESTED.items() for b in bs)]}
-ALL = set().union(*OPTIONS.values()) | {"--version", "--no-code"}
+ALL = set().union(*OPTIONS.values()) | {"--version", "--no-code", "--allow-code"}
 
 
 def sentences(path: Path) -> Iterator[tuple[int, str]]:

@@ -16,7 +16,7 @@ from upright.errors import RigStopped, nearest
 from upright.progress import part
 from upright.realtime.session import RunState
 from upright.report.page import Chapter
-from upright.rigs.board import told
+from upright.rigs.board import fault_text
 from upright.rigs.protocol import Fault, Mode
 from upright.verbs.answer import Answer
 
@@ -45,9 +45,9 @@ def test_a_run_shows_its_time_deviations_command_and_what_is_wrong():
     fault = next(iter(Fault))
     wrong = lines(replace(state, late=3, faults=fault), 10.0)
     assert "3 late" in wrong.plain
-    assert told(fault) in wrong.plain
+    assert fault_text(fault) in wrong.plain
     red = {wrong.plain[s.start : s.end].strip() for s in wrong.spans if "red" in str(s.style)}
-    assert red == {"3 late", told(fault)}
+    assert red == {"3 late", fault_text(fault)}
     assert not any("red" in str(s.style) for s in text.spans)
     assert lines(RunState(phase="waiting for you"), 1.0).plain == "Waiting for you\nspace, q or Esc: stop"
 

@@ -30,7 +30,6 @@ def law(which):
     return design.feedback(design.filtered(SAMPLED, 0.5), K)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("direction", [[0, 0, 1, 0], [0, 0, 0, 1]])
 def test_a_law_on_the_unstable_mode_recovers_what_the_limit_can(direction):
     """The coordinate z of that mode, z' = p z + b u, runs away beyond b U/p whatever u does; u = -k z reaches it."""
@@ -49,7 +48,6 @@ def test_a_law_on_the_unstable_mode_recovers_what_the_limit_can(direction):
     assert largest(rig, law(3), "inverted", direction, most=3 * bound) < bound
 
 
-@pytest.mark.slow
 def test_twice_the_start_with_twice_the_friction_and_limit_is_twice_the_motion():
     """Linear but for dry friction and limit, both of degree one: the limit cycle grows with the friction."""
     start = np.array([0.0, 0.0, 2e-4, 0.0])
@@ -205,7 +203,7 @@ def test_a_preflight_asks_for_the_tilt_and_for_a_tap_of_the_last_coordinate_each
     assert found.margins == design.margins(driven, law(0))
     assert sum(found.words.values()) == 1.0
     assert found.words == {word: float(word == "stabilised") for word in WORDS}
-    assert found.quiet_chance == 1.0
+    assert found.quiet_share == 1.0
 
 
 def test_a_hand_errs_by_its_spread_about_the_start():
@@ -294,4 +292,4 @@ def test_coarse_encoders_make_the_same_gains_excessive_and_a_chance_of_holding_d
     assert found.chance == 1.0
     assert found.word == said
     assert found.rest.quiet is (said == "stabilised")
-    assert found.quiet_chance == float(said == "stabilised")
+    assert found.quiet_share == float(said == "stabilised")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import upright as up
@@ -70,9 +71,9 @@ def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(
     told = with_margins(done, FINE, peak_sampled=25.0)._loop_verdict()
     assert "takes 25 V, 250 % of the limit, and saturates the drive; up to 40 % of this start it does not." in told
     assert with_margins(done, FINE, peak_sampled=10.0)._loop_verdict().endswith("takes 100 % of the drive's limit.")
-    free = with_margins(done, FINE, wish=replace(done.wish, limit=None))
+    free = with_margins(done, FINE, request=replace(done.request, limit=None))
     assert free._loop_verdict() == "Stable with margin."
-    assert any("whether it saturates is not known" in w for w in chapter(free).warnings)
+    assert any("so saturation is not predicted" in w for w in chapter(free).warnings)
     assert not any("saturates" in w for w in chapter(done).warnings)
 
 
@@ -116,11 +117,11 @@ def test_a_state_of_any_unit_has_a_gain_per_that(unit, per):
 
 
 def test_who_says_how_late_a_command_acts_is_told(done):
-    late = design_for(ARM.replace(delay="3 ms"), done.wish)
+    late = design_for(ARM.replace(delay="3 ms"), done.request)
     assert late.sampled.delay == pytest.approx(1.5)
     for design, words in (
         (late, "1.5 samples late (as the file says)"), (done, "1 samples late (assumed)"),
-        (design_for(ARM, replace(done.wish, delay=2.0)), "2 samples late (as asked)"),
+        (design_for(ARM, replace(done.request, delay=2.0)), "2 samples late (as requested)"),
     ):  # fmt: skip
         assert words in chapter(design).parts[2].content[0]
     plain = StateSpace(A=[[-1.0]], B=[[1.0]], C=[[1.0]])
@@ -128,3 +129,53 @@ def test_who_says_how_late_a_command_acts_is_told(done):
     assert "(assumed)" in chapter(design_for(plain, wish)).parts[2].content[0]
     held = chapter(design_for(plain.to_sampled(1e-3), wish))
     assert "0 samples late (besides what the matrices hold)" in held.parts[2].content[0]
+
+
+def test_a_way_by_which_the_loop_falls_says_so_instead_of_a_noise(done):
+    """Of plain matrices no noise is known, and only the margins are missing."""
+    fallen = replace(done.ways[0], margins=None, command_noise=None)
+    held = replace(done.ways[1], margins=None)
+    told = chapter(replace(done, ways=(fallen, held, *done.ways[2:])))
+    rows = tables(told)[2].rows
+    assert rows[0][2:] == ("falls", "–", "–", "–", "–")
+    assert rows[1][2:] == (number(held.command_noise, 2), "–", "–", "–", "–")
+    bare = replace(fallen, speed_noise=None)
+    alone = chapter(replace(done, ways=(bare,), chosen=replace(done.chosen, speed_noise=None)))
+    assert tables(alone)[2].rows == ((bare.name, "falls", "–", "–", "–"),)
+    assert tables(alone)[2].numbers == (2, 3, 4)
+
+
+def test_poles_of_sampled_matrices_are_those_whose_motion_outlasts_a_third_of_a_sample():
+    """Of 5 ms: what dies faster than 3/0.005 = 600 1/s is counted and not written."""
+    model = StateSpace(A=[[math.exp(-3.0 * 0.005), 0.1], [0.0, math.exp(-700 * 0.005)]], B=[[0.1], [0.2]],
+                       C=[[1.0, 0.0]], dt=0.005)  # fmt: skip
+    told = chapter(design_for(model, DesignRequest(at="", poles=(-5.0, -20.0), period=5e-3, speed="")))
+    rows = {row[0]: row[1] for row in tables(told)[1].rows}
+    assert rows["model, open loop"][1:] == "3, and 1 faster"  # behind its minus
+    assert "faster" not in rows["requested"]
+
+
+def test_the_converter_of_the_drive_goes_into_the_file_and_none_where_nobody_named_one(done):
+    assert chapter(done).numbers["converter"] == 0.0
+    on = replace(ARM.replace(converter=0.005), basis=MEASURED)
+    known = replace(done, request=replace(done.request, on=on))
+    assert chapter(known).numbers["converter"] == 0.005
+
+
+def test_a_rig_that_nobody_identified_is_led_to_a_fit_and_one_with_a_fit_is_not(done):
+    proposed = [s.command for s in chapter(done).steps]
+    assert any("upright identify STUDY.toml" in c for c in proposed)
+    drawn = replace(done, rig=replace(done.rig, draws=((done.rig.plant, done.rig.gain),)))
+    assert not any("upright identify STUDY.toml" in s.command for s in chapter(drawn).steps)
+
+
+@pytest.mark.parametrize("weights", [(), (1.0, 0.0, 30.0, 0.1)])
+def test_the_way_of_the_poles_of_least_cost_passes_through_those_chosen(weights):
+    """Its middle, the 150th of 300 weights a hundredfold either way, is the effort weight that was chosen."""
+    done = design_for(ARM, DesignRequest(at="inverted", weights=weights, period=2e-3, limit=10.0))
+    assert done.R is not None
+    pictures = {b.name: b for part in chapter(done).parts for b in part.content if hasattr(b, "draw")}
+    (ax,) = pictures["locus"].draw().axes
+    drawn = [complex(x, y) for line in ax.get_lines() for x, y in np.asarray(line.get_xydata()).tolist()]
+    for pole in done.wanted[done.wanted.imag >= 0]:
+        assert min(abs(z - pole) for z in drawn) < 0.05 * abs(pole)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -25,16 +27,16 @@ def test_a_design_without_poles_holds_the_rig(name, at):
     model = rig.linear(at)
     closed = np.linalg.eigvals(model.A - model.B @ np.reshape(design.K, (1, -1)))
     assert closed.real.max() < 0
-    assert np.sort(closed.real) == pytest.approx(np.sort(design.wish.poles.real), rel=1e-6)
+    assert np.sort(closed.real) == pytest.approx(np.sort(design.request.poles.real), rel=1e-6)
     assert design.chosen.margins.modulus > 0.4
-    assert "Nobody asked for poles" in str(design)
+    assert "No poles were requested" in str(design)
 
 
 @pytest.mark.parametrize("name", RIGS)
 def test_no_other_pace_is_quieter_with_as_much_margin(name):
     design = up.design(RIGS[name])
-    pace = design.wish.poles.real.max() / -design.wish.proposed
-    others = [up.design(RIGS[name], poles=design.wish.poles * times / design.wish.proposed) for times in PACES]
+    pace = design.request.poles.real.max() / -design.request.proposed
+    others = [up.design(RIGS[name], poles=design.request.poles * times / design.request.proposed) for times in PACES]
     widest = max(d.chosen.margins.modulus for d in others)
     assert design.chosen.margins.modulus >= NEARLY * widest
     louder = [d.chosen.command_noise for d in others if d.chosen.margins.modulus >= NEARLY * widest]
@@ -47,7 +49,7 @@ def test_a_start_that_the_drive_cannot_take_asks_for_slower_poles():
     """Twice the tilt needs twice the command, at any pace; the pace that takes least is then the one."""
     mild, hard = (up.design(RIGS["furuta"], start={"theta": tilt}) for tilt in ("2 deg", "60 deg"))
     assert mild.peak_sampled <= 10
-    peaks = [up.design(RIGS["furuta"], poles=hard.wish.poles * t / hard.wish.proposed, start={"theta": "60 deg"})
+    peaks = [up.design(RIGS["furuta"], poles=hard.request.poles * t / hard.request.proposed, start={"theta": "60 deg"})
              .peak_sampled for t in PACES]  # fmt: skip
     assert hard.peak_sampled == pytest.approx(min(peaks))
 
@@ -73,3 +75,24 @@ def test_no_pace_that_a_loop_can_hold_is_said():
     """A delay of half a second outlasts a fall by e every 0.13 s many times."""
     with pytest.raises(BadInput, match=r"no poles from 0\.7 to 2 times"):
         up.design(RIGS["furuta"], delay=250)
+
+
+@pytest.mark.parametrize("at", ["hanging", "inverted"])
+@pytest.mark.parametrize("name", RIGS)
+def test_proposed_poles_are_real_a_quarter_of_the_first_apart_and_of_the_rig_s_own_pace(name, at):
+    """Poles that meet make gains large; the pace is that of the fall upright, or of the slowest swing hanging."""
+    rig = RIGS[name]
+    poles = np.linalg.eigvals(rig.linear(at).A)
+    pace = poles.real.max() if at == "inverted" else np.abs(poles[np.abs(poles.imag) > 1e-3]).min()
+    request = up.design(rig, at=at).request
+    assert request.proposed in (0.7, 1.0, 1.4, 2.0)
+    np.testing.assert_allclose(request.poles, -request.proposed * pace * np.array([1.0, 1.25, 1.5, 1.75]), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("poles", "pace"),
+    [([3.0, 5.0, -1.0, -9.0], 5.0), ([-1 + 4j, -1 - 4j, -0.3 + 7j, -0.3 - 7j], math.sqrt(17)), ([-2.0, -5.0, 0.0], 2.0),
+     ([1e-7, -5.0], 5.0)],
+)  # fmt: skip
+def test_the_own_pace_is_the_fastest_fall_else_the_slowest_swing_else_the_slowest_decay(poles, pace):
+    assert own_pace(np.array(poles, dtype=complex)) == pytest.approx(pace)

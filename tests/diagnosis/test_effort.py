@@ -134,6 +134,18 @@ def test_a_command_that_comes_first_or_at_once_is_not_late(made):
     assert about("early", made) == []
 
 
+@pytest.mark.parametrize(
+    ("dt", "ahead", "told"), [(2e-3, 0.018, False), (2e-3, 0.022, True), (0.01, 0.02, False), (0.01, 0.04, True)]
+)
+def test_motion_is_early_by_a_fiftieth_of_a_second_or_three_samples(dt, ahead, told):
+    """Seen a sample after a step begins: what a clock or a rounded stamp may be late by is no fault."""
+    t = np.arange(1500) * dt
+    at = 500
+    x = np.where(np.arange(1500) >= at, 1.0, 0.0)
+    u = np.where(t >= t[at] + ahead - 1e-9, 1.0, 0.0)
+    assert (about("early", case(dt, x=x, u=u, measured=("x",), drive="u")) != []) == told
+
+
 def test_the_first_of_several_bodies_is_named():
     made = case(
         a=np.where(T >= 2.5, np.sin(5 * (T - 2.5)), 0.0), b=np.where(T >= 2, np.sin(5 * (T - 2)), 0.0),

@@ -147,15 +147,15 @@ def test_experiments_side_by_side_say_what_they_say_one_after_another(tmp_path):
         assert fits[0]["parameters"] == fits[1]["parameters"]
 
 
-def test_worn_rigs_are_other_rigs_and_are_made_again(bench, tmp_path):
+def test_nonideal_rigs_are_other_rigs_and_are_made_again(bench, tmp_path):
     """What was kept of clean ones is none of theirs; the report and the command say which they are."""
     laboratory.run_laboratory((), "", 0, tmp_path)
-    session = laboratory.run_laboratory((), "", 0, tmp_path, worn=True)
+    session = laboratory.run_laboratory((), "", 0, tmp_path, nonideal=True)
     assert [t.state for t in session.results] == ["done", "done", "done"]
     assert session.stand("furuta").rig.plant.b_1s > session.stand("furuta").rig.plant.b_1c > 0
     book = laboratory.book(session, laboratory.date(2006, 6, 18))
-    assert "They are worn" in dict(book.facts)["Data"]
-    assert dict(book.facts)["Again"] == "upright lab --worn"
+    assert "They have unmodelled effects" in dict(book.facts)["Data"]
+    assert dict(book.facts)["Again"] == "upright lab --nonideal"
 
 
 def test_the_cover_names_each_rig_once_with_the_seed_that_makes_it_again(bench, tmp_path):

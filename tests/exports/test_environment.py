@@ -63,7 +63,7 @@ def test_a_drive_that_is_late_remembers_its_commands_from_step_to_step(fit):
 
     known = read_stored_rig(fit, draws=1)
     late = {n: Entry(value=v, unit="s", source="known") for n, v in (("delay", 0.031), ("lag", 0.012))}
-    lanes = Episodes(replace(known, draws=(), hardware=known.hardware.given(late)), 2)
+    lanes = Episodes(replace(known, draws=(), hardware=known.hardware.with_entries(late)), 2)
     lanes.reset(np.ones(2, dtype=bool), np.random.default_rng(3))
     x0, actions = lanes.x.copy(), np.random.default_rng(4).uniform(-1, 1, (8, 2, 1))
     for action in actions:

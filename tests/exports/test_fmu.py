@@ -174,12 +174,12 @@ def test_the_same_rig_gives_the_same_file(tmp_path):
 
 def test_what_a_unit_does_not_remember_is_said_or_refused(tmp_path):
     soft = chain(1)(m_1=0.5, k_1=10.0, f_1c=0.1, delta_1=1e-3)
-    assert any("slides at once" in line for line in unit_of(identified(tmp_path, soft)).told)
+    assert any("slides at once" in line for line in unit_of(identified(tmp_path, soft)).remarks)
     entry = {"relaxation": {"value": 0.01, "unit": "s", "source": "known"}}
     slow = identified(tmp_path, soft, **entry)
     with pytest.raises(BadInput, match="relaxation"):
         unit_of(slow)
-    assert unit_of(replace(slow, hardware=Hardware())).told
+    assert unit_of(replace(slow, hardware=Hardware())).remarks
 
 
 def test_a_tool_is_told_every_variable_with_its_unit_meaning_and_number(tmp_path):

@@ -172,10 +172,10 @@ def test_the_replay_takes_every_branch():
     assert np.ptp(memory[:, 1]) > 1.0
 
 
-def test_the_verb_writes_a_sketch_and_says_what_an_uno_does_not(tmp_path):
+def test_the_verb_writes_a_sketch_and_says_what_a_mega_does_not(tmp_path):
     done = up.export(MIXED, to="arduino", out=tmp_path)
     assert (tmp_path / "law" / "law.ino").exists()
-    assert "double has 32 bits (Uno, Mega, Nano) the self-test may fail" in str(done)
+    assert "double has 32 bits (Mega) the self-test may fail" in str(done)
 
 
 @pytest.mark.parametrize(

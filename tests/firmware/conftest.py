@@ -48,8 +48,9 @@ def avr(built: Callable[[str, str], Path]) -> Iterator[Start]:
     folder, boards = built("avr", "avr-gcc"), []
     built("simrig", "cc simavr")
 
-    def start(*arguments: str) -> Board:
-        boards.append(Board(folder / "simrig", folder / "atmega2560-analog.elf", *arguments))
+    def start(*arguments: str, drive: str = "analog") -> Board:
+        image = folder / f"atmega2560-{drive}.elf"
+        boards.append(Board(folder / "simrig", image, *([] if drive == "analog" else [drive]), *arguments))
         return boards[-1]
 
     yield start

@@ -144,6 +144,23 @@ def test_a_lying_encoder_ends_in_a_fault_with_the_power_off(avr, mishap, faults)
     assert board.state()[5:7] == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("mode", [Mode.IDLE, Mode.FAULT])
+def test_a_converter_that_lost_its_zero_gets_it_again_and_the_enable_line_follows_it(avr, mode):
+    board = avr(*UPRIGHT)
+    rig = started(board, Mode.HOST)
+    rig.exchange(1.0)
+    rig.stop() if mode == Mode.IDLE else rig.estop()
+    board.do("glitch 12345")
+    assert board.state()[5:7] == [12345, 0.0]
+    board.do("run 2")
+    assert board.state()[5:7] == [0.0, 0.0]
+    if mode == Mode.IDLE:
+        board.do("glitch 12345")
+        rig.arm()
+        assert board.say("met") == "0"
+        assert board.state()[6] == 1.0
+
+
 def test_a_processor_that_hangs_is_reset_with_the_power_off(avr):
     board = avr(*UPRIGHT)
     rig = started(board, Mode.MCU, inverted())

@@ -6,18 +6,25 @@ import pytest
 
 from benchmarks.boards import plant
 from benchmarks.designs import GAIN, PARAMETERS
+from tests.firmware.test_pwm import STEPS, SUPPLY
 from tests.rigs import conformance
 
 HANGING = plant(PARAMETERS, GAIN)
 
 
-@pytest.fixture(params=["host", pytest.param("avr", marks=pytest.mark.slow)])
+SLOW = [pytest.param(drive, marks=pytest.mark.slow) for drive in ("analog", "pair", "sign")]
+
+
+@pytest.fixture(params=["host", *SLOW])
 def specimen(request):
-    start, boards = request.getfixturevalue(request.param), {}
+    start, boards = request.getfixturevalue("host" if request.param == "host" else "avr"), {}
+    how, bridge = {}, request.param in ("pair", "sign")
+    if request.param != "host":
+        how["drive"] = request.param
 
     def make():
-        board = start(*HANGING)
-        rig = board.rig(lockstep=True)
+        board = start(*HANGING, *([f"step={SUPPLY / STEPS!r}"] if bridge else []), **how)
+        rig = board.rig(lockstep=True, **({"full_scale": SUPPLY} if bridge else {}))
         boards[rig] = board
         return rig
 
@@ -28,4 +35,4 @@ def specimen(request):
 
 
 class TestFirmware(conformance.Conformance):
-    """All rules, on the host and on the ATmega2560."""
+    """All rules, on the host and on the ATmega2560 with a converter and with either kind of H-bridge."""

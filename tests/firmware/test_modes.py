@@ -515,7 +515,7 @@ def test_a_transition_that_no_encoder_makes_stops_the_rig(host):
     assert rig.exchange(7.0).faults == Fault.ENCODER
     assert dead(board)
     seen = rig.snapshot()
-    assert seen.asked == math.floor(7.0 / STEP + 0.5)
+    assert seen.command == math.floor(7.0 / STEP + 0.5)
     assert seen.sample.applied == math.floor(WIDE.command / STEP)
 
 

@@ -196,6 +196,31 @@ def test_the_riccati_matrix_is_the_cost_from_a_start(sampled):
     assert x0 @ S @ x0 == pytest.approx(total, rel=1e-6)
 
 
+def test_an_effort_that_costs_nothing_is_used_whole():
+    """A scalar x' = a x + b u is put to zero in one step, K = a/b, and S is the weight of that one step, q."""
+    for a, b, q in ((2.0, 0.5, 3.0), (-0.7, 4.0, 1.0)):
+        K, S, E = least_cost(np.array([[a]]), np.array([[b]]), [q], 0.0, sampled=True)
+        np.testing.assert_allclose([K[0, 0], S[0, 0], abs(E[0])], [a / b, q, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_without_a_cost_of_the_effort_the_riccati_equation_holds_and_is_the_limit_of_small_ones(inputs):
+    """``S = A'SA - A'SB (B'SB)^-1 B'SA + Q``; python-control's S at R = 1e-9 lies beside it."""
+    import control
+
+    rng = np.random.default_rng(3)
+    A, B = rng.normal(size=(3, 3)), rng.normal(size=(3, inputs))
+    Q = np.diag([1.0, 2.0, 0.5])
+    K, S, E = least_cost(A, B, Q, np.zeros((inputs, inputs)), sampled=True)
+    gain = np.linalg.solve(B.T @ S @ B, B.T @ S @ A)
+    np.testing.assert_allclose(K, gain, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(S, A.T @ S @ A - A.T @ S @ B @ gain + Q, rtol=1e-7)
+    np.testing.assert_allclose(S, S.T)
+    assert np.abs(E).max() < 1
+    _, limit, _ = control.dlqr(A, B, Q, 1e-9 * np.eye(inputs))
+    np.testing.assert_allclose(S, limit, rtol=1e-6)
+
+
 @pytest.mark.parametrize("gamma", [0.0, 0.5, 1.3])
 def test_prefilter_of_a_steered_vehicle(gamma):
     """Astrom and Murray, Feedback Systems, Example 7.4: k_r = w_c^2."""

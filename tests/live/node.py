@@ -25,6 +25,8 @@ def in_node(scripts: list[Path], body: str, given: Any) -> Any:
             "process.stdout.write(JSON.stringify(result));",
         ]
     )
-    done = subprocess.run([NODE, "-e", whole], input=json.dumps(given), capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    finished = subprocess.run(
+        [NODE, "-e", whole], input=json.dumps(given, allow_nan=False), capture_output=True, text=True, check=False
+    )
+    assert finished.returncode == 0, finished.stderr[-2000:]
+    return json.loads(finished.stdout)

@@ -178,3 +178,9 @@ def test_decimal_commas_are_seen_below_rows_of_whole_numbers():
     found = record("t [ms];theta [deg]\n" + "".join(f"{5 * i};0\n" for i in range(300)) + "1500;1,25\n1505,5;-3\n")
     assert found["theta [deg]"][-2:].tolist() == [1.25, -3.0]
     assert found.t[-1] == pytest.approx(1.5055)
+
+
+def test_a_first_column_of_another_name_counts_in_the_unit_that_it_states() -> None:
+    seen = record("Stempel [ms],x\n0,1\n5,2\n10,3\n")
+    np.testing.assert_allclose(seen.t, [0, 5e-3, 10e-3])
+    assert not any("named like a time" in note for note in seen.provenance.notes)

@@ -198,3 +198,12 @@ def test_a_unit_behind_the_name_of_a_place_is_its_own(name: str, unit: str) -> N
     """``theta_m`` is the angle of a motor and no length; what is behind a rate is left as it was."""
     t, x = swing()
     assert inspect(Record(t=t, signals={name: 0.3 * x})).column(name).guess == unit
+
+
+@pytest.mark.parametrize(("name", "drives"), [("Vm (V)", True), ("Motor [V]", True), ("pot [V]", False)])
+def test_volts_that_change_with_every_sample_measure_and_those_in_steps_drive(name: str, drives: bool) -> None:
+    t, theta = swing()
+    noisy = theta + 1e-3 * np.random.default_rng(0).normal(size=t.size)
+    volts = np.repeat([0.0, 1.5, -1.2, 0.7, -2.1, 0.0, 1.9, 0.3], t.size // 8) if drives else noisy
+    seen = inspect(Record(t=t, signals={name: volts, "theta": theta}, units={name: "V", "theta": "rad"}))
+    assert seen.column(name).drive == drives

@@ -139,20 +139,32 @@ def measured_response_page(folder: Path) -> Chapter:
     return log_chapter(LoggedResponse(sources=("sines.csv",), response=response, answer=None, folder=folder))
 
 
+class Rising:
+    """Takes progress that never goes back and never says more than all; a fit's own starts may begin anew."""
+
+    def __init__(self) -> None:
+        self.share = 0.0
+
+    def __call__(self, step: str, share: float) -> None:
+        least = 0.0 if ": " in step else self.share - 1e-12
+        assert least <= share <= 1.0, f"{step}: {share:.3g} after {self.share:.3g}"
+        self.share = max(share, self.share)
+
+
 def loadings_page(folder: Path) -> Chapter:
     from upright.experiments.stand.twin import TwinStand
     from upright.experiments.weighing_1a.chapter import chapter
     from upright.experiments.weighing_1a.run import run_weighing
     from upright.rig.makes import make_rig
 
-    return chapter(run_weighing(TwinStand(rig=make_rig("rectilinear", 2)), 2, folder))
+    return chapter(run_weighing(TwinStand(rig=make_rig("rectilinear", 2)), 2, folder, Rising()))
 
 
 def frequency_page(folder: Path) -> Chapter:
     from upright.experiments.frequency_1b.chapter import chapter
     from upright.experiments.frequency_1b.run import run_frequency
 
-    return chapter(run_frequency("linear", 4, folder))
+    return chapter(run_frequency("linear", 4, folder, Rising()))
 
 
 def own_frequency_page(folder: Path) -> Chapter:
@@ -173,7 +185,8 @@ def regulation_page(folder: Path) -> Chapter:
 
     wish = RegulationRequest(draws=16, seconds=2.0)
     known = completed(identify_make("linear", 1, folder))
-    return chapter(run_regulation(known, TwinStand(rig=make_rig("linear", 1)), 1, folder, wish=wish))
+    stand = TwinStand(rig=make_rig("linear", 1))
+    return chapter(run_regulation(known, stand, 1, folder, Rising(), request=wish))
 
 
 def swing_up_page(folder: Path) -> Chapter:
@@ -182,14 +195,14 @@ def swing_up_page(folder: Path) -> Chapter:
     from upright.experiments.swing_up_2b.run import run_swing_up
     from upright.rig.makes import make_rig
 
-    return chapter(run_swing_up(make_rig("furuta"), TwinStand(rig=make_rig("furuta", 3)), folder))
+    return chapter(run_swing_up(make_rig("furuta"), TwinStand(rig=make_rig("furuta", 3)), folder, Rising()))
 
 
 def tracking_page(folder: Path) -> Chapter:
     from upright.experiments.tracking_3.chapter import chapter
     from upright.experiments.tracking_3.run import run_tracking
 
-    return chapter(run_tracking("rectilinear", 1, folder))
+    return chapter(run_tracking("rectilinear", 1, folder, Rising()))
 
 
 def free_swing_page(folder: Path) -> Chapter:
@@ -197,7 +210,7 @@ def free_swing_page(folder: Path) -> Chapter:
     from upright.experiments.free_swing_4.run import run_free_swing
     from upright.rig.makes import make_rig
 
-    return chapter(run_free_swing(make_rig("furuta", 1), 1, folder))
+    return chapter(run_free_swing(make_rig("furuta", 1), 1, folder, Rising()))
 
 
 def blocks(chapter: Chapter, kind: type, *, aside: bool = True) -> list:

@@ -195,7 +195,7 @@ def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
     found = (KeyNumber(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)
     made = [replace(page(tmp_path), key=e.key, findings=found)
             for page, e in zip((short_ladder_page, measured_response_page), EXPERIMENTS, strict=False)]  # fmt: skip
-    session = Session(make="", seed=7, folder=tmp_path, asked=EXPERIMENTS[:3], interrupted=True)
+    session = Session(make="", seed=7, folder=tmp_path, requested=EXPERIMENTS[:3], interrupted=True)
     session.results.extend(
         ExperimentResult(experiment=e, make="furuta", rig="Furuta pendulum", chapter=c, state="done", seconds=1.0)
         for e, c in zip(EXPERIMENTS, made, strict=False)

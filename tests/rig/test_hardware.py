@@ -23,7 +23,7 @@ RIG = Hardware(name="bench 3", vendor="", entries={"limit": entry(10.0), "travel
 
 def test_entries_are_laid_over_each_other():
     assert RIG.over({"limit": entry(5.0), "lag": entry(0.01, "s")}).entries == {**RIG.entries, "lag": entry(0.01, "s")}
-    given = RIG.given({"limit": entry(5.0), "travel": None})
+    given = RIG.with_entries({"limit": entry(5.0), "travel": None})
     assert given.entries == {"limit": entry(5.0), "travel": RIG.entries["travel"]}
     assert (RIG.value("limit", 3.0), RIG.value("lag", 3.0)) == (10.0, 3.0)
     assert RIG.plain() == {

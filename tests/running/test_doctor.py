@@ -49,14 +49,14 @@ def test_a_sound_rig_shows_what_it_is_and_how_far_a_hand_moved_it(tmp_path, make
     checkup = check_up(rig_file(tmp_path, make))
     assert checkup.sound
     assert checkup.verdict == f"Link, limits and encoders of {rig.name} answer as they should."
-    assert "2 encoders, a tick every 0.884 ms" in found(checkup, "link").found
-    assert found(checkup, "servo period").found == "0.884 ms, described as 0.884 ms"
+    assert "2 encoders, a tick every 0.884 ms" in found(checkup, "link").observed
+    assert found(checkup, "servo period").observed == "0.884 ms, described as 0.884 ms"
     driven, _ = (c.name for c in rig.plant.coordinates)
     turned = f"showed {round(0.1 / math.tau * 16_000) * 360 / 16_000:.3g} degrees"
-    assert found(checkup, "theta by hand").found == turned
-    assert found(checkup, f"{driven} by hand").found == (turned if driven == "psi" else "showed 10 mm")
+    assert found(checkup, "theta by hand").observed == turned
+    assert found(checkup, f"{driven} by hand").observed == (turned if driven == "psi" else "showed 10 mm")
     limit = f"command {rig.limit:.4g} V; watchdog 20 ms"
-    assert found(checkup, "limits, read back").found.endswith(limit)
+    assert found(checkup, "limits, read back").observed.endswith(limit)
     assert [f.good for f in checkup.findings] == [True] * 7
 
 
@@ -66,13 +66,13 @@ def test_a_channel_that_is_dead_or_counts_backwards_is_told_by_its_name(tmp_path
     wired(lambda rig: rig.port.encoders.dead(channel))
     checkup = check_up(rig_file(tmp_path), pulse=False)
     finding = found(checkup, f"{name} by hand")
-    assert (finding.good, finding.found) == (False, "showed 0 degrees: not connected, or not this channel")
-    assert checkup.verdict == f"Do not close a loop: {name} by hand: {finding.found}"
+    assert (finding.good, finding.observed) == (False, "showed 0 degrees: not connected, or not this channel")
+    assert checkup.verdict == f"Do not close a loop: {name} by hand: {finding.observed}"
     assert found(checkup, f"{other} by hand").good
     wired(lambda rig: rig.port.encoders.scaled(channel, -1.0))
     finding = found(check_up(rig_file(tmp_path), pulse=False), f"{name} by hand")
-    assert (finding.good, finding.found[:11]) == (False, "showed -5.7")
-    assert finding.found.endswith("it counts the wrong way, swap its channels")
+    assert (finding.good, finding.observed[:11]) == (False, "showed -5.7")
+    assert finding.observed.endswith("it counts the wrong way, swap its channels")
 
 
 def test_a_hand_is_asked_in_the_coordinate_s_unit_and_may_refuse(tmp_path):
@@ -83,7 +83,7 @@ def test_a_hand_is_asked_in_the_coordinate_s_unit_and_may_refuse(tmp_path):
         ["Move theta by hand in its positive sense", "degrees."],
     ]
     left = [found(checkup, w) for w in ("x by hand", "theta by hand", "a small pulse")]
-    assert [(f.found, f.good) for f in left] == [("not moved", None)] * 2 + [("not given", None)]
+    assert [(f.observed, f.good) for f in left] == [("not moved", None)] * 2 + [("not given", None)]
     assert checkup.sound
     assert checkup.verdict.endswith("Not looked at: x by hand, theta by hand, a small pulse.")
 
@@ -93,7 +93,7 @@ def test_a_stop_that_is_pressed_meanwhile_is_told_instead_of_the_next_channel(tm
     wired(rigs.append)
     checkup = check_up(rig_file(tmp_path), hand=lambda _: rigs[0].estop() or False, pulse=False)
     finding = found(checkup, "theta by hand")
-    assert (finding.found, finding.good) == ("it was stopped by hand", False)
+    assert (finding.observed, finding.good) == ("it was stopped by hand", False)
     assert not checkup.sound
 
 
@@ -112,7 +112,7 @@ def test_a_hand_that_moved_a_tenth_of_what_it_should_is_seen(tmp_path, wired, sh
     finding = found(check_up(rig_file(tmp_path, "linear"), hand=hand, pulse=False), "x by hand")
     assert finding.good == good
     counts = math.floor(share * MOVED / 10 * PER_METRE + 0.5)
-    assert finding.found.split(":")[0] == f"showed {1e3 * counts / PER_METRE:.3g} mm"
+    assert finding.observed.split(":")[0] == f"showed {1e3 * counts / PER_METRE:.3g} mm"
 
 
 def test_a_rig_that_is_not_the_one_described_is_told(tmp_path, wired):
@@ -127,10 +127,12 @@ def test_a_rig_that_is_not_the_one_described_is_told(tmp_path, wired):
     wired(other)
     checkup = check_up(rig_file(tmp_path), pulse=False)
     assert found(checkup, "servo period").good is False
-    assert found(checkup, "servo period").found == "0.8928 ms, described as 0.884 ms"
+    assert found(checkup, "servo period").observed == "0.8928 ms, described as 0.884 ms"
     assert found(checkup, "counts").good is False
     per = make_rig("furuta").per_unit
-    assert np.allclose([float(n) for n in found(checkup, "counts").found.split(", ")], [per[0], 2 * per[1]], rtol=1e-5)
+    assert np.allclose(
+        [float(n) for n in found(checkup, "counts").observed.split(", ")], [per[0], 2 * per[1]], rtol=1e-5
+    )
 
 
 def test_a_pulse_that_nothing_answers_is_told_as_the_pulse(tmp_path, wired):
@@ -138,7 +140,7 @@ def test_a_pulse_that_nothing_answers_is_told_as_the_pulse(tmp_path, wired):
     checkup = check_up(rig_file(tmp_path))
     last = checkup.findings[-1]
     assert (last.what, last.good) == ("a small pulse", False)
-    assert "psi" in last.found
+    assert "psi" in last.observed
 
 
 def test_the_board_is_let_go_whatever_was_found(tmp_path, wired):
@@ -152,7 +154,7 @@ def test_the_board_is_let_go_whatever_was_found(tmp_path, wired):
 
 def test_what_was_not_looked_at_is_no_fault_and_the_first_fault_is_the_verdict():
     def of(*goods):
-        return Checkup(name="rig", findings=tuple(CheckupFinding(what=f"{i}", found="so", good=g)
+        return Checkup(name="rig", findings=tuple(CheckupFinding(what=f"{i}", observed="so", good=g)
                                                   for i, g in enumerate(goods)))  # fmt: skip
 
     assert of(True, None, True).verdict == "Link, limits and encoders of rig answer as they should. Not looked at: 1."

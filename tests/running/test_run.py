@@ -323,12 +323,12 @@ def test_the_rest_is_told_from_the_second_half_about_what_was_held_or_what_it_va
     }
     held = replace(
         done, log=replace(done.log, columns=columns), end=replace(done.end, target=target),
-        wish=replace(wish, law=folder / "design.json", excite=""),
+        request=replace(wish, law=folder / "design.json", excite=""),
     )  # fmt: skip
     assert held.t[[0, -1]] == pytest.approx([0.0, 1.99])
     assert held.unrest == pytest.approx([math.hypot(0.3, 0.04)] * 2)
     assert f"theta stayed within {math.degrees(math.hypot(0.3, 0.04)):.2g} degrees (rms, second half)" in held.verdict
-    followed = replace(held, wish=replace(held.wish, reference="sine 0.1 2.5"))
+    followed = replace(held, request=replace(held.request, reference="sine 0.1 2.5"))
     assert followed.unrest == pytest.approx([0.04] * 2)
     assert "theta varied by 2.3 degrees (rms, second half)" in followed.verdict
 

@@ -58,7 +58,7 @@ def test_arrays_without_a_period_are_a_model_at_its_samples():
         (lambda: up.lab(seed=-1), "at least 0, got -1"),
         (lambda: up.lab(rig="nowhere.toml"), "there is no file 'nowhere.toml'"),
         (lambda: up.lab(rig="nowhere.toml", workers=2), "are for twins of makes"),
-        (lambda: up.lab(rig="nowhere.toml", worn=True), "are for twins of makes"),
+        (lambda: up.lab(rig="nowhere.toml", nonideal=True), "are for twins of makes"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_said_at_once(call, said, tmp_path, monkeypatch):
@@ -97,3 +97,11 @@ def test_a_file_is_no_folder_for_a_laboratory(tmp_path):
     (tmp_path / "out").write_text("mine", encoding="utf-8")
     with pytest.raises(BadInput, match="out is a file; name another with -o"):
         up.lab(out=tmp_path / "out")
+
+
+def test_the_former_name_of_nonideal_rigs_means_the_same_and_warns():
+    with (
+        pytest.warns(DeprecationWarning, match="nonideal="),
+        pytest.raises(up.BadInput, match="on hardware there is one"),
+    ):
+        up.lab(rig="nowhere.toml", worn=True)

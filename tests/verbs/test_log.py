@@ -13,6 +13,7 @@ import pytest
 from tests.closed_loop.programs import Pid, closed_loop
 from upright.errors import BadInput
 from upright.records import Record
+from upright.study.load import load_study
 from upright.verbs.log import doctor, init, law, read, show
 
 T = np.arange(1500) * 4e-3
@@ -105,3 +106,21 @@ def test_the_verbs_load_no_numerical_library_before_they_are_called():
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, encoding="utf-8", check=True)
     assert out.stdout.strip() == "[]"
+
+
+def test_a_clock_in_milliseconds_that_states_no_unit_is_read_with_one(tmp_path):
+    log = tmp_path / "swing.csv"
+    np.savetxt(log, np.column_stack([1e3 * T, SWING]), "%.9g", ",", header="t,theta [rad]", comments="")
+    np.testing.assert_allclose(read(log, time_unit="ms").t, T, atol=1e-9)
+    assert show(log, time_unit="ms").value.time.period == pytest.approx(4e-3)
+    init(log, out=tmp_path / "swing.toml", time_unit="ms")
+    study = load_study(tmp_path / "swing.toml")  # which holds the unit for every later command
+    assert study.runs[0].t[1] - study.runs[0].t[0] == pytest.approx(4e-3)
+
+
+@pytest.mark.parametrize("unit", ["mV", "fortnights"])
+def test_a_time_unit_that_is_none_is_refused_in_a_sentence(tmp_path, unit):
+    log = tmp_path / "swing.csv"
+    np.savetxt(log, np.column_stack([1e3 * T, SWING]), "%.9g", ",", header="t,theta [rad]", comments="")
+    with pytest.raises(BadInput, match=f"a unit of time.*{unit}"):
+        read(log, time_unit=unit)

@@ -76,8 +76,8 @@ def test_numbers_of_a_rig_may_have_any_unit_of_their_kind():
 
 
 def test_a_start_is_of_the_pendulum_unless_it_names_states():
-    assert up.design(RIG, start="3 deg").value.wish.start == pytest.approx((0, 0, math.pi / 60, 0))
-    named = up.design(RIG, start="theta=3 deg, psi_dot=0.5 rad/s").value.wish.start
+    assert up.design(RIG, start="3 deg").value.request.start == pytest.approx((0, 0, math.pi / 60, 0))
+    named = up.design(RIG, start="theta=3 deg, psi_dot=0.5 rad/s").value.request.start
     assert named == pytest.approx((0, 0.5, math.pi / 60, 0))
     with pytest.raises(up.BadInput, match="names states"):
         up.regulate(RIG, start="phi=3 deg")

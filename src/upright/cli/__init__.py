@@ -1,7 +1,7 @@
 """Which commands does the tool answer to?
 
 Each is a function in `upright/verbs`, or in another package that names it as an entry point of the group
-``upright.commands``; `cli.build` makes a command of it when it is asked for.
+``upright.commands``; `cli.build` makes a command of it when it is called.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from upright import verbs
 from upright.cli.build import SETTINGS, build
 from upright.cli.sentences import USER_ERROR, only_sentences, sentences
 from upright.errors import BadInput
-from upright.trust import no_code
+from upright.trust import allow_code, no_code
 from upright.verbs.command import Command, command_of
 
-NO_CODE = "--no-code"
+NO_CODE, ALLOW_CODE = "--no-code", "--allow-code"
 SECTIONS = ("Log", "Model", "Control", "Course", "upright rig", "upright log")
 """Of ``upright --help``; what other packages add follows."""
 ELSEWHERE = "upright.commands"
@@ -34,14 +34,14 @@ ELSEWHERE = "upright.commands"
 
 def _declared() -> dict[str, Command]:
     """Every command of this package by its words; rooms of verbs without one may need NumPy, and are not imported."""
-    found: dict[str, Command] = {}
+    commands: dict[str, Command] = {}
     for name, origin in _modules(verbs.__path__, verbs.__name__):
         if b"@command(" in Path(origin).read_bytes():
             for value in vars(import_module(name)).values():
                 if isfunction(value) and value.__module__ == name and "command" in vars(value):
-                    said = command_of(value)
-                    found[said.words] = said
-    return found
+                    command = command_of(value)
+                    commands[command.words] = command
+    return commands
 
 
 def _modules(folders: Iterable[str], package: str) -> Iterator[tuple[str, str]]:
@@ -54,12 +54,12 @@ def _modules(folders: Iterable[str], package: str) -> Iterator[tuple[str, str]]:
 
 
 DECLARED = _declared()
-COMMANDS = {words: said.line for words, said in DECLARED.items() if " " not in words}
+COMMANDS = {words: command.line for words, command in DECLARED.items() if " " not in words}
 NESTED: dict[str, dict[str, str]] = {}
 """Commands of two words, ``upright log show``, by the first."""
-for _words, _said in DECLARED.items():
+for _words, _command in DECLARED.items():
     if " " in _words:
-        NESTED.setdefault(_words.split()[0], {})[_words.split()[1]] = _said.line
+        NESTED.setdefault(_words.split()[0], {})[_words.split()[1]] = _command.line
 
 
 def elsewhere() -> dict[str, Any]:
@@ -74,7 +74,7 @@ def elsewhere() -> dict[str, Any]:
 
 
 class Commands(TyperGroup):
-    """The commands by their names; one is built when it is asked for. Of ``log show``, `log` is such a group itself."""
+    """The commands by their names; one is built when it is called. Of ``log show``, `log` is such a group itself."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -106,12 +106,12 @@ class Commands(TyperGroup):
         )  # fmt: skip
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take `--no-code` wherever it stands; it is an option of all commands. Without a word, list them."""
+        """Take `--no-code` and `--allow-code` of any command wherever they stand. Without a word, list commands."""
         if not args and not ctx.resilient_parsing:  # Typer shows nothing where rich has no part in the help
             typer.echo(ctx.get_help(), err=True)
             ctx.exit(USER_ERROR)
-        moved = [NO_CODE] if NO_CODE in args else []
-        return super().parse_args(ctx, moved + [word for word in args if word != NO_CODE])
+        moved = [option for option in (NO_CODE, ALLOW_CODE) if option in args]
+        return super().parse_args(ctx, moved + [word for word in args if word not in moved])
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """List the commands in plain text; rich's boxes cost 0.15 s here, where people wait for nothing else."""
@@ -120,11 +120,11 @@ class Commands(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands section by section."""
         sections: dict[str, list[tuple[str, str]]] = {name: [] for name in SECTIONS}
-        for words, said in (DECLARED | elsewhere()).items():
+        for words, command in (DECLARED | elsewhere()).items():
             if words.startswith(self.before):
                 try:
-                    said = said if words in DECLARED else _loaded(words, said)
-                    group, line = said.group, said.line
+                    command = command if words in DECLARED else _loaded(words, command)
+                    group, line = command.group, command.line
                 except BadInput as error:
                     group, line = Command.group, str(error)
                 section = f"upright {words.split()[0]}" if " " in words else group
@@ -137,7 +137,8 @@ class Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what a person got wrong becomes a sentence and an exit code."""
         only_sentences()
-        with sentences(), no_code(bool(ctx.params.get("no_code"))):
+        refused, allowed = (bool(ctx.params.get(name)) for name in ("no_code", "allow_code"))
+        with sentences(), no_code(refused), allow_code(allowed):
             return super().invoke(ctx)
 
 
@@ -160,8 +161,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         from upright._version import __version__
 
         typer.echo(f"upright {__version__}")
@@ -175,6 +176,9 @@ def _upright(
     ] = False,
     no_code: Annotated[
         bool, typer.Option(NO_CODE, help="Refuse to run Python code that a study or a fit.json names as its plant.")
+    ] = False,
+    allow_code: Annotated[
+        bool, typer.Option(ALLOW_CODE, help="Run it without asking; where nobody can answer it is refused otherwise.")
     ] = False,
 ) -> None:
     """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""
@@ -207,7 +211,7 @@ def _any_terminal() -> None:
 
 
 def _flush() -> None:
-    """Write what is still waiting; a reader that went away is no error, a full disk is said."""
+    """Write what is still waiting; a reader that closed is no error, a full disk is reported."""
     try:
         sys.stdout.flush()
     except OSError as error:

@@ -39,8 +39,8 @@ def build(command: Command) -> Any:
     callbacks = {n for n, p in verb.items() if re.search(r"Callable|Progress", _annotation(p))}
     texts = parameter_texts(command.verb)
     for p in [p for p in verb.values() if p.kind is p.VAR_KEYWORD]:
-        asked, said = shared_parameters(p, command.verb.__module__)
-        verb, texts = {**verb, **asked}, {**said, **texts}
+        shared, shared_texts = shared_parameters(p, command.verb.__module__)
+        verb, texts = {**verb, **shared}, {**shared_texts, **texts}
     away = {*callbacks, *command.hidden, *(n for n, p in verb.items() if p.kind in (p.VAR_POSITIONAL, p.VAR_KEYWORD))}
     typed = [_option(command, p, texts) for p in verb.values() if p.name not in away]
     typed += [_flag(name, flag) for name, flag in command.flags.items()]
@@ -50,10 +50,10 @@ def build(command: Command) -> Any:
     def call(**words: Any) -> None:
         as_json = words.pop("as_json", False)
         flags = {name: words.pop(name) for name in command.flags}
-        given = command.given({n: _value(verb[n], word) for n, word in words.items()})
-        with services(callbacks - given.keys(), quiet=as_json) as served:
-            answer = command.verb(**given, **served)
-        answer = answer if command.told is None else command.told(answer)
+        arguments = command.prepare({n: _value(verb[n], word) for n, word in words.items()})
+        with services(callbacks - arguments.keys(), quiet=as_json) as served:
+            answer = command.verb(**arguments, **served)
+        answer = answer if command.lines is None else command.lines(answer)
         terminal.tell(answer, as_json=as_json)
         if getattr(answer, "interrupted", False):
             raise typer.Exit(INTERRUPTED)
@@ -77,17 +77,17 @@ def _option(command: Command, parameter: inspect.Parameter, texts: Mapping[str, 
     elif kind is Path and isinstance(default, str):
         default = Path(default)
     least, most = command.ranges.get(name, RANGES.get(name, (None, None)))
-    said: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "help": _plain(command.helps.get(name) or HELPS.get(name) or texts.get(name, "")) or None,
         "metavar": command.metavars.get(name, METAVARS.get(name)), "min": least, "max": most,
     }  # fmt: skip
     if parameter.kind is not parameter.KEYWORD_ONLY and not named:
-        about = typer.Argument(**said)
+        about = typer.Argument(**settings)
     else:
         word = name.replace("_", "-")
         words = (word, f"no-{word}") if default is True else (word,)
         switch = "/".join(f"--{w}" for w in words)
-        about = typer.Option(*(named or [switch]), **said)
+        about = typer.Option(*(named or [switch]), **settings)
     kind = kind | None if default is None else kind
     return parameter.replace(kind=parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, about])
 
@@ -101,8 +101,8 @@ def _value(parameter: inspect.Parameter, word: Any) -> Any:
 
 
 def _annotation(parameter: inspect.Parameter) -> str:
-    said = parameter.annotation
-    text = said if isinstance(said, str) else inspect.formatannotation(said)
+    annotation = parameter.annotation
+    text = annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
     return text.replace("collections.abc.", "").replace("typing.", "")
 
 
@@ -136,12 +136,12 @@ def _plain(text: str) -> str:
 
 
 def _flag(name: str, flag: Flag, option: str = "") -> inspect.Parameter:
-    def shown(asked: bool) -> None:
-        if asked and flag.prints is not None:
+    def shown(requested: bool) -> None:
+        if requested and flag.prints is not None:
             typer.echo(flag.prints())
             raise typer.Exit
 
-    said = typer.Option(
+    switch = typer.Option(
         option or f"--{name}", help=flag.help, callback=shown if flag.prints else None, is_eager=bool(flag.prints)
     )
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, said])
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, switch])

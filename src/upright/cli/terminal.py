@@ -1,4 +1,4 @@
-"""What commands share: the console, a bar while they work, and the end of each, where the answer is told."""
+"""What commands share: the console, a bar while they work, and how each prints its answer."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ def progress_bar(*, quiet: bool = False) -> Generator[Progress]:
 @contextmanager
 def step_lines(*, quiet: bool = False) -> Generator[Progress]:
     """Each new step as a line on stderr, for work that asks and shows things in between."""
-    screen, said = console(error=True), ""
+    screen, last = console(error=True), ""
 
     def progress(step: str, _share: float) -> None:
-        nonlocal said
+        nonlocal last
         head = ": ".join(step.split(": ")[:2])  # counts of evaluations are no steps
-        if not quiet and head != said:
-            said = head
+        if not quiet and head != last:
+            last = head
             screen.print(step, style="dim", markup=False)
 
     yield progress

@@ -74,7 +74,7 @@ def lines(state: RunState, largest: float) -> Any:
     """What is shown of a run: phase, deviations, command as a bar, late ticks, faults, the key that stops it."""
     from rich.text import Text
 
-    from upright.rigs.board import told
+    from upright.rigs.board import fault_text
 
     if state.phase != "running":
         return Text.assemble((f"{state.phase[:1].upper()}{state.phase[1:]}", "bold"), "\nspace, q or Esc: stop")
@@ -86,7 +86,7 @@ def lines(state: RunState, largest: float) -> Any:
         f"away {away}\n", f"command {state.applied:+8.3f} {bar}\n",
     )  # fmt: skip
     if state.faults:
-        out.append(f"{told(state.faults)}\n", style="bold red")
+        out.append(f"{fault_text(state.faults)}\n", style="bold red")
     out.append("space, q or Esc: stop", style="dim")
     return out
 

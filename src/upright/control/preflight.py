@@ -1,7 +1,7 @@
-"""Will this law hold that rig? Asked of the model, before anything moves.
+"""Will this law stabilise that rig? Predicted by the model, before anything moves.
 
 Margins and noise come from the linear sampled loop. Everything else is simulated on the nonlinear model as identified,
-with dry friction, encoder counts, converter, limit, delay and lag: the run that is asked for, the same run on every rig
+with dry friction, encoder counts, converter, limit, delay and lag: the run that is requested, the same run on every rig
 that the identification allows, and how far the pendulum may lean or be tapped.
 """
 
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from upright.basis import Basis
 from upright.control.effort import FELT, RestEffort
 from upright.control.score import Score, Scores, effort_at_rest, outcomes, score
 from upright.control.trial import Trial, trial
@@ -34,7 +35,7 @@ WORDS = (STABILISED, SATURATED, BUSY, "does not settle", "leaves its travel", "f
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What a law is asked to do.
+    """What a law has to do.
 
     Attributes
     ----------
@@ -91,13 +92,42 @@ class Preflight:
     words: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
-    def chance(self) -> float:
-        """Share of the rigs allowed that are held to the end."""
+    def share(self) -> float:
+        """Share of the simulated rigs that are stabilised to the end."""
         return float(np.mean(self.drawn.held))
 
     @property
-    def quiet_chance(self) -> float:
-        """Share of the rigs allowed that are held to the end and settle by a command that is quiet at rest."""
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of the share, by Wilson, from how many rigs were simulated."""
+        from scipy.stats import binomtest
+
+        found = binomtest(int(np.sum(self.drawn.held)), self.drawn.held.size).proportion_ci(method="wilson")
+        return float(found.low), float(found.high)
+
+    @property
+    def chance(self) -> float:
+        """Probability that the rig is stabilised to the end: the `share`, where the model is worth it.
+
+        Raises
+        ------
+        BadInput
+            When the model is not trusted.
+        """
+        if not self.basis.supports:
+            raise BadInput(
+                "no probability of stabilisation is supported by a model that is not trusted; identify the rig so that "
+                "it is. What the simulated rigs came to is `share`."
+            )
+        return self.share
+
+    @property
+    def basis(self) -> Basis:
+        """The model that all of this rests on."""
+        return self.run.rig.basis
+
+    @property
+    def quiet_share(self) -> float:
+        """Share of the simulated rigs that are stabilised and settle by a command that is quiet at rest."""
         return self.words[STABILISED] + self.words[SATURATED]
 
     @property

@@ -1,4 +1,4 @@
-"""Which poles to begin with, where nobody asked for any?
+"""Proposed closed-loop poles, where none are requested.
 
 As fast as the rig falls, or swings where nothing falls, and somewhat slower or faster. Of those that hold as many of
 the rigs that a fit allows, whose start the drive can take, whose command is quiet at rest, and whose loop keeps nearly
@@ -25,7 +25,7 @@ NEARLY = 0.9
 """Share of the largest distance to -1 from which a quieter command decides."""
 
 
-def design_unasked(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
+def design_unasked(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
     """The design with proposed poles.
 
     Raises
@@ -33,20 +33,20 @@ def design_unasked(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
     BadInput
         When nothing about the model says how fast, or no loop of that pace stands.
     """
-    model = rig if isinstance(rig, StateSpace) else rig.linear(wish.at)
+    model = rig if isinstance(rig, StateSpace) else rig.linear(request.at)
     pace = own_pace(to_s(poles_of(model.A), model.period) if model.dt is not None else poles_of(model.A))
     tried: list[tuple[float, Designed]] = []
     for times in PACES:
         poles = -times * pace * (1 + SPREAD * np.arange(len(model.states)))
-        done = design_for(rig, replace(wish, poles=poles.astype(np.complex128), proposed=times))
-        if done.chosen.margins is not None:
-            tried.append((done.chosen.margins.modulus, done))
+        design = design_for(rig, replace(request, poles=poles.astype(np.complex128), proposed=times))
+        if design.chosen.margins is not None:
+            tried.append((design.chosen.margins.modulus, design))
     if not tried:
         raise BadInput(
             f"no poles from {PACES[0]:g} to {PACES[-1]:g} times {pace:.3g} 1/s, as fast as the model moves by itself, "
-            f"are held with a period of {1e3 * wish.period:.4g} ms and this delay; sample faster, or give --poles."
+            f"are held with a period of {1e3 * request.period:.4g} ms and this delay; sample faster, or give --poles."
         )
-    limit = np.inf if wish.limit is None else wish.limit
+    limit = np.inf if request.limit is None else request.limit
     surest = max(_chance(d) for _, d in tried)
     sure = [(m, d) for m, d in tried if _chance(d) >= surest - 0.01]
     within = [(m, d) for m, d in sure if d.peak_sampled <= limit] or [min(sure, key=lambda one: one[1].peak_sampled)]
@@ -75,10 +75,10 @@ def own_pace(poles: Roots) -> float:
     )
 
 
-def _chance(done: Designed) -> float:
-    return 1.0 if done.chance is None else done.chance
+def _chance(design: Designed) -> float:
+    return 1.0 if design.chance is None else design.chance
 
 
-def _loudness(done: Designed) -> float:
-    noise = done.chosen.command_noise
-    return done.peak_sampled if noise is None else noise
+def _loudness(design: Designed) -> float:
+    noise = design.chosen.command_noise
+    return design.peak_sampled if noise is None else noise

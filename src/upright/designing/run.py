@@ -50,15 +50,16 @@ SPEEDS = ("plain", "filtered", "kalman")
 
 @dataclass(frozen=True, kw_only=True)
 class DesignRequest:
-    """What is asked of the loop; SI units, the limit in the command's.
+    """Request for a loop; SI units, the limit in the command's.
 
     `period` is that of the matrices where they are sampled.
     `delay` is how late a command acts in all [samples]: that of the rig's file when None, or one where it has none.
     `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is one of `SPEEDS`, or a way that matrices allow, empty for the plainest; `memory` is the filter's. With
-    `sampled`, the gains are those whose sampled loop has the poles asked. `on` is the rig completed for a run, where
-    it is one. `proposed` is how many times as fast as the model itself proposed poles are; None of poles asked.
+    `sampled`, the gains are those whose sampled loop has the requested poles. `on` is the rig completed for a run,
+    where it is one. `proposed` is how many times as fast as the model itself proposed poles are; None where poles are
+    requested.
     """
 
     at: str
@@ -120,12 +121,12 @@ class Designed:
     `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs;
     `swing` is that way back: t, outputs, commands.
     `holding` is simulated; None of plain matrices, without a limit, and where the linear loop falls.
-    K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
+    K are the gains in force: the `continuous` ones of placement or LQR (`placement` is None then), or the
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
 
     rig: Rig | StateSpace
-    wish: DesignRequest
+    request: DesignRequest
     model: StateSpace
     sampled: StateSpace
     K: Array
@@ -148,12 +149,12 @@ class Designed:
     @property
     def open_loop(self) -> Roots:
         """Poles of the model, the fastest growing first."""
-        found = _in_s(self.model, poles_of(self.model.A))
-        return found[np.lexsort((found.imag, -found.real))]
+        poles = _in_s(self.model, poles_of(self.model.A))
+        return poles[np.lexsort((poles.imag, -poles.real))]
 
     @property
     def wanted(self) -> Roots:
-        """Poles asked for, or those of least cost."""
+        """Requested poles, or those of LQR."""
         if self.placement is not None:
             return self.placement.requested
         return _in_s(self.model, poles_of(self.model.A - self.model.B @ self.continuous))
@@ -172,13 +173,13 @@ class Designed:
         way, unit = self.chosen, self.rig.unit
         if way.margins is None:
             return (
-                f"The sampled loop falls: with a period of {1e3 * self.wish.period:.4g} ms, "
+                f"The sampled loop falls: with a period of {1e3 * self.request.period:.4g} ms, "
                 f"{self.sampled.delay:.3g} samples of delay and the {way.name} the gains do not stabilize. "
                 "Sample faster, ask for slower poles, or design for the sampled loop (--sampled)."
             )
         thin = self._reservations(way.margins)
         head = "Stable, with reservations: " + "; ".join(thin) if thin else "Stable with margin"
-        limit = self.wish.limit
+        limit = self.request.limit
         if limit is None:
             return f"{head}."
         share = self.peak_sampled / limit
@@ -191,14 +192,14 @@ class Designed:
 
     def _reservations(self, m: Margins) -> list[str]:
         """What is thin about the loop, or too much about its command at rest."""
-        chance, limit = self.chance, self.wish.limit or math.inf
+        chance, limit = self.chance, self.request.limit or math.inf
         rounding = (self.chosen.command_noise or 0.0) / limit
         out = [
             text
             for text, bad in (
                 (f"distance to -1 is only {m.modulus:.2f}", m.modulus < 0.4),
                 (f"a gain {100 * (1 - m.least_gain):.0f} % weaker makes it unstable", m.least_gain > 0.7),
-                (f"it bears only {1e3 * m.delay:.2g} ms more delay", m.delay < self.wish.period),
+                (f"it bears only {1e3 * m.delay:.2g} ms more delay", m.delay < self.request.period),
                 (f"{100 * (1 - (chance or 0)):.0f} % of the rigs sampled from the fit's covariance are unstable with "
                  "it", chance is not None and chance < 0.99),
             )
@@ -217,62 +218,62 @@ class Designed:
 
 
 @one_thread()
-def design_for(rig: Rig | StateSpace, wish: DesignRequest) -> Designed:
-    """Gains as wished, and their loop as a computer runs it.
+def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
+    """Gains as requested, and their loop as a computer runs it.
 
     Parameters
     ----------
     rig : Rig or StateSpace
         A plain model knows no encoders and no covariance, and needs no equilibrium.
-    wish : DesignRequest
+    request : DesignRequest
 
     Raises
     ------
     BadInput
-        When what is asked cannot be had; the sentence says why.
+        When the request cannot be met; the sentence says why.
     """
     if isinstance(rig, StateSpace):
-        model, sampled = _plain(rig), _held(_plain(rig), wish)
+        model, sampled = _plain(rig), _held(_plain(rig), request)
     else:
-        model = rig.linear(wish.at)
-        sampled = model.to_sampled(wish.period, _late(rig, wish), rig.lag if wish.lag is None else wish.lag)
-    start = np.array(wish.start) if wish.start else _tilt(rig)
+        model = rig.linear(request.at)
+        sampled = model.to_sampled(request.period, _late(rig, request), rig.lag if request.lag is None else request.lag)
+    start = np.array(request.start) if request.start else _tilt(rig)
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this model has {model.B.shape[1]}; use place.")
-    K, placement, R = _gains(model, wish, start)
+    K, placement, R = _gains(model, request, start)
     wanted = placement.requested if placement is not None else _in_s(model, poles_of(model.A - model.B @ K))
     resolution: tuple[float, ...] | None = None
     if isinstance(rig, StateSpace):
-        speed = chosen(model, wish.speed)
+        speed = chosen(model, request.speed)
         known = dict.fromkeys((speed, *estimators(model)[:-1]))
-        ways = {s: estimator(s, sampled, wish.memory, wanted) for s in known}
+        ways = {s: estimator(s, sampled, request.memory, wanted) for s in known}
     else:
-        speed, ways, resolution = _from_encoders(rig, model, sampled, wish)
+        speed, ways, resolution = _from_encoders(rig, model, sampled, request)
     observed = speed in ("kalman", "observer")
-    if wish.sampled and observed:
+    if request.sampled and observed:
         raise BadInput(
             f"--sampled is for states that no model estimates; with --speed {speed} the poles are met as they are."
         )
-    needed = wish.sampled or model.dt is None  # gains of a sampled model are at its samples already
+    needed = request.sampled or model.dt is None  # gains of a sampled model are at its samples already
     gains = place_sampled(sampled, ways[speed], wanted) if needed and not observed else None
-    used = gains if wish.sampled and gains is not None else K
+    used = gains if request.sampled and gains is not None else K
     k_pf = None
-    if wish.track:
-        if wish.track not in rig.outputs:
-            raise BadInput(f"nothing called '{wish.track}' is measured; --track one of {', '.join(rig.outputs)}.")
-        i = rig.outputs.index(wish.track)
+    if request.track:
+        if request.track not in rig.outputs:
+            raise BadInput(f"nothing called '{request.track}' is measured; --track one of {', '.join(rig.outputs)}.")
+        i = rig.outputs.index(request.track)
         D = float(model.D[i, 0])
         k_pf = prefilter(model.A, model.B, model.C[i], used, D=D, sampled=model.dt is not None)
     law = replace(feedback(ways[speed], used, k_pf or 0.0), target=at_rest(model))
     t, x, u = _way_back(model, K, start)
     loops = {s: _velocity_loop(model, sampled, e, used, resolution) for s, e in ways.items()}
-    cloud, chance = _cloud(rig, wish, sampled, law)
+    cloud, chance = _cloud(rig, request, sampled, law)
     peak = _peak(sampled, law, start, float(t[-1]))
     return Designed(
-        rig=rig, wish=wish, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
+        rig=rig, request=request, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
         sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), sampled.period),
         ways=tuple(loops.values()), chosen=loops[speed], k_pf=k_pf, peak=float(np.abs(u).max()),
-        peak_sampled=peak, holding=_holding(wish, sampled, law, start, peak),
+        peak_sampled=peak, holding=_holding(request, sampled, law, start, peak),
         swing=(t, x @ model.C.T + u @ model.D.T, u), chance=chance, cloud=cloud,
     )  # fmt: skip
 
@@ -293,15 +294,15 @@ def _plain(model: StateSpace) -> StateSpace:
     return model if model.dt is None else replace(model, continuous=None, delay=0.0, lag=0.0)
 
 
-def _held(model: StateSpace, wish: DesignRequest) -> StateSpace:
+def _held(model: StateSpace, request: DesignRequest) -> StateSpace:
     """A plain model as the loop meets it: a sample late unless it is one of samples, which holds its delay."""
-    late = wish.delay if wish.delay is not None else 0.0 if model.dt else 1.0
+    late = request.delay if request.delay is not None else 0.0 if model.dt else 1.0
     if model.D.any() and not late:
         raise BadInput(
             "with a D the readings show the command of the same sample, and no computer answers a reading by what "
             "changes it; let the command come a sample late: --delay 1."
         )
-    return model.to_sampled(wish.period, late, wish.lag or 0.0)
+    return model.to_sampled(request.period, late, request.lag or 0.0)
 
 
 def _in_s(model: StateSpace, poles: Roots) -> Roots:
@@ -309,32 +310,32 @@ def _in_s(model: StateSpace, poles: Roots) -> Roots:
     return to_s(poles, model.period) if model.dt is not None else poles
 
 
-def _gains(model: StateSpace, wish: DesignRequest, start: Array) -> tuple[Array, Placement | None, float | None]:
-    """Gains as wished, how their poles were placed, in s, or the weight of the effort."""
+def _gains(model: StateSpace, request: DesignRequest, start: Array) -> tuple[Array, Placement | None, float | None]:
+    """Gains as requested, how their poles were placed, in s, or the weight of the effort."""
     A, B = model.A, model.B
-    if wish.poles is not None:
-        placement = _placed_samples(model, wish.poles) if model.dt is not None else place(A, B, wish.poles)
-        return placement.K, placement, wish.R
-    weights, R, discrete = wish.weights or (1.0,) * A.shape[0], wish.R, model.dt is not None
-    if R is None and (discrete or wish.limit is None):
+    if request.poles is not None:
+        placement = _placed_samples(model, request.poles) if model.dt is not None else place(A, B, request.poles)
+        return placement.K, placement, request.R
+    weights, R, discrete = request.weights or (1.0,) * A.shape[0], request.R, model.dt is not None
+    if R is None and (discrete or request.limit is None):
         other = "" if discrete else " or a limit (--limit)"
-        raise BadInput(f"least cost needs a weight of the effort (--effort-weight){other}; give one.")
+        raise BadInput(f"LQR needs a weight of the effort (--effort-weight){other}; give one.")
     if R is None:
-        R = weight_for_effort(A, B, weights, start, wish.limit or math.inf, states=model.states)
+        R = weight_for_effort(A, B, weights, start, request.limit or math.inf, states=model.states)
     return least_cost(A, B, weights, R, sampled=discrete, states=model.states).K, None, R
 
 
 def _placed_samples(model: StateSpace, poles: Roots) -> Placement:
     """Gains of a model that is known at its samples, poles in s; placed as (z - 1)/T, which spreads those near 1."""
-    asked, T = conjugate_poles(poles, model.A.shape[0]), model.period
-    if np.abs(asked.imag).max() > math.pi / T:
+    requested, T = conjugate_poles(poles, model.A.shape[0]), model.period
+    if np.abs(requested.imag).max() > math.pi / T:
         raise BadInput(
-            f"samples of {1e3 * T:g} ms show nothing faster than {math.pi / T:.4g} rad/s, and a pole was asked at "
-            f"{written(asked)}; ask for slower ones."
+            f"samples of {1e3 * T:g} ms show nothing faster than {math.pi / T:.4g} rad/s, and a pole was requested at "
+            f"{written(requested)}; ask for slower ones."
         )
-    found = place((model.A - np.eye(asked.size)) / T, model.B / T, (to_z(asked, T) - 1) / T)
-    attained = to_s(1 + T * found.attained, T)
-    return replace(found, requested=asked, attained=attained, miss=float(np.abs(attained - asked).max()))
+    placement = place((model.A - np.eye(requested.size)) / T, model.B / T, (to_z(requested, T) - 1) / T)
+    attained = to_s(1 + T * placement.attained, T)
+    return replace(placement, requested=requested, attained=attained, miss=float(np.abs(attained - requested).max()))
 
 
 def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, Array]:
@@ -349,25 +350,31 @@ def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, 
 
 
 def _from_encoders(
-    rig: Rig, model: StateSpace, sampled: StateSpace, wish: DesignRequest
+    rig: Rig, model: StateSpace, sampled: StateSpace, request: DesignRequest
 ) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
-    """The way to the velocities that was asked for, all that a rig has, and the steps of its encoders."""
-    resolution = wish.resolution or tuple(completed(rig, needs=("counts",), who="upright design").resolution.tolist())
-    if wish.limit is None and wish.speed == "kalman":
+    """The requested velocity estimator, all that a rig has, and the steps of its encoders."""
+    resolution = request.resolution or tuple(
+        completed(rig, needs=("counts",), who="upright design").resolution.tolist()
+    )
+    if request.limit is None and request.speed == "kalman":
         raise BadInput(
             "a Kalman filter has to know how hard the rig is pushed, a tenth of what the drive can; give the largest "
             'command (--limit 10, or [actuator] limit = "10 V" in the study).'
         )
-    ways = SPEEDS if wish.limit is not None else SPEEDS[:-1]
-    limit = wish.limit or math.inf
-    return wish.speed, {s: velocities(model, sampled, s, wish.memory, limit, resolution) for s in ways}, resolution
+    ways = SPEEDS if request.limit is not None else SPEEDS[:-1]
+    limit = request.limit or math.inf
+    return (
+        request.speed,
+        {s: velocities(model, sampled, s, request.memory, limit, resolution) for s in ways},
+        resolution,
+    )
 
 
-def _late(rig: Rig, wish: DesignRequest) -> float:
+def _late(rig: Rig, request: DesignRequest) -> float:
     """How late a command acts [samples]; what was identified from a log holds the computer's share already."""
-    if wish.delay is not None:
-        return wish.delay
-    return rig.delay / wish.period or 1.0
+    if request.delay is not None:
+        return request.delay
+    return rig.delay / request.period or 1.0
 
 
 def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
@@ -378,17 +385,17 @@ def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
-def _holding(wish: DesignRequest, sampled: StateSpace, law: Law, start: Array, peak: float) -> Holding | None:
+def _holding(request: DesignRequest, sampled: StateSpace, law: Law, start: Array, peak: float) -> Holding | None:
     """What holding takes on the rig, let go near enough for half of the limit to bring it back."""
-    if wish.on is None or wish.limit is None or not 0 < peak < math.inf:
+    if request.on is None or request.limit is None or not 0 < peak < math.inf:
         return None
-    slowest = -float(to_s(poles_of(closed(sampled, law)), wish.period).real.max())
-    seconds = min(max(SLOWEST / slowest, 6.0), ROWS * wish.period)
-    rig = wish.on.replace(delay=sampled.delay * wish.period, lag=sampled.lag)
-    near = start * min(1.0, 0.5 * wish.limit / peak)
-    run = trial(rig, replace(law, target=0.0), at=wish.at, start=near, seconds=seconds)
-    found = score(run)
-    return Holding(effort=effort_at_rest(run), lost=min(found.fell, found.ran_out))
+    slowest = -float(to_s(poles_of(closed(sampled, law)), request.period).real.max())
+    seconds = min(max(SLOWEST / slowest, 6.0), ROWS * request.period)
+    rig = request.on.replace(delay=sampled.delay * request.period, lag=sampled.lag)
+    near = start * min(1.0, 0.5 * request.limit / peak)
+    run = trial(rig, replace(law, target=0.0), at=request.at, start=near, seconds=seconds)
+    scored = score(run)
+    return Holding(effort=effort_at_rest(run), lost=min(scored.fell, scored.ran_out))
 
 
 def _tilt(rig: Rig | StateSpace) -> Array:
@@ -413,7 +420,7 @@ def velocities(
     memory : float
         Of the filtered difference.
     limit : float
-        Largest command. For the Kalman filter every coordinate is shaken by itself as much as a tenth of it would:
+        Largest command. For the Kalman filter the process noise of every coordinate is what a tenth of it would cause:
         pushes, friction, what the model leaves out.
     resolution : float or array
         Step of each encoder [m or rad].
@@ -439,11 +446,11 @@ def _velocity_loop(
     )
 
 
-def _cloud(rig: Rig | StateSpace, wish: DesignRequest, nominal: StateSpace, law: Law) -> tuple[Roots, float | None]:
+def _cloud(rig: Rig | StateSpace, request: DesignRequest, nominal: StateSpace, law: Law) -> tuple[Roots, float | None]:
     """Poles [1/s] of the loop with these gains on every rig that the fit allows, and the share that stands."""
-    others = [] if isinstance(rig, StateSpace) else rig.spread(wish.at)
-    rows = [poles_of(closed(m.to_sampled(wish.period, nominal.delay, nominal.lag), law)) for m in others]
+    others = [] if isinstance(rig, StateSpace) else rig.spread(request.at)
+    rows = [poles_of(closed(m.to_sampled(request.period, nominal.delay, nominal.lag), law)) for m in others]
     if not rows:
         return np.zeros(0, dtype=np.complex128), None
     z = np.array(rows)
-    return to_s(z, wish.period).ravel(), float(np.mean(np.abs(z).max(axis=1) < 1))
+    return to_s(z, request.period).ravel(), float(np.mean(np.abs(z).max(axis=1) < 1))

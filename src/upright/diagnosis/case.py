@@ -15,6 +15,7 @@ from upright.errors import BadInput
 from upright.physics import Plant, find, name_of
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.rig import Hardware, Rig
 from upright.study.description import rig_with_guesses
 from upright.study.draft.recognise import RATE, drive_column, recognise
@@ -34,7 +35,7 @@ HELD = 0.2
 class Place:
     """A coordinate as it was measured: `y` (N,) and its `resolution` in `unit`, and the column it came from.
 
-    The unit is the coordinate's, or counts where nobody said how many make a turn or a metre.
+    The unit is the coordinate's, or counts where counts per turn or metre are not specified.
     """
 
     column: str
@@ -50,14 +51,15 @@ class Case:
     Attributes
     ----------
     record, inspection
-        The log, and what can be told about it before any model.
+        The log, and what is known about it before any model.
     plant : type of Plant or None
     rig : Rig or None
-        With the numbers that are known; None where only the plant's name is, or nobody said which column is what.
+        With the numbers that are known; None where only the plant's name is, or the wiring of its columns is not
+        specified.
     places : mapping of str to Place
         Measured coordinates.
     zeroed : bool
-        Whether somebody said where each coordinate is zero, rather than the record.
+        Whether each coordinate's zero is specified, rather than taken from the record.
     drive : str
         Column of the effort; empty when there is none.
     u : (N,) array
@@ -105,7 +107,7 @@ class Case:
             derived, n = self.plant.derived(without=frozenset(self.plant.optional)), len(self.plant.coordinates)
             apart = sum(text != "0" for text in derived.mass) == n  # joined by forces alone
             return apart and not derived.trig and len({c.unit for c in self.plant.coordinates}) == 1
-        return all(column_unit(c) in ("counts", "m", "mm") for c in self.measured)
+        return all(column_unit(c) in ("counts", *LENGTHS) for c in self.measured)
 
     def moves(self, name: str) -> bool:
         """Whether a coordinate moves by more than 3 % of the largest motion in the same unit."""
@@ -144,8 +146,8 @@ class Case:
 
     def over_time(self, *columns: str) -> tuple[Panel, ...]:
         """Columns over the whole record, those that the log has."""
-        found = [self.inspection.column(name) for name in columns if name in self.record.signals]
-        return tuple(self._panel(c, slice(None), "steps" if c.stepwise else "line") for c in found)
+        present = [self.inspection.column(name) for name in columns if name in self.record.signals]
+        return tuple(self._panel(c, slice(None), "steps" if c.stepwise else "line") for c in present)
 
     def near(self, column: str, i: int) -> Panel:
         """Readings of a column near sample `i`."""
@@ -255,23 +257,23 @@ def _recognised(record: Record, inspection: Inspection, plant: type[Plant] | Non
     """Columns found by name and kind; a plant that needs angles gets none from counts of an unknown encoder."""
     named = "" if plant is None else name_of(plant)
     try:
-        found = recognise(record, inspection, named)
+        recognised = recognise(record, inspection, named)
     except BadInput:
-        found = None
-    column = found.drive if found else drive_column(record, inspection)
+        recognised = None
+    column = recognised.drive if recognised else drive_column(record, inspection)
     u: Array = record[column.name] if column is not None else np.zeros(record.t.size)
     if column is not None and any(lie.startswith("the first samples are outliers") for lie in column.lies):
         u = np.concatenate([np.full(3, u[3]), u[3:]])
     places: dict[str, Place] = {}
     chain = plant is not None and not any(c.name in ("theta", "psi", "x") for c in plant.coordinates)
     for coordinate in plant.coordinates if plant is not None else ():
-        c = found.columns.get(coordinate.name) if found is not None else None
-        if c is None or found is None:
+        c = recognised.columns.get(coordinate.name) if recognised is not None else None
+        if c is None or recognised is None:
             continue
-        factor = {"rad": 1.0, "": 1.0, "deg": math.pi / 180, "m": 1.0, "mm": 1e-3}.get(c.guess, 0.0)
+        factor = {"": 1.0, **ANGLES, **LENGTHS}.get(c.guess, 0.0)
         if factor or chain or coordinate.unit == "m":
             factor = factor or 1.0
-            y = factor * (record[c.name] - found.rest[coordinate.name])
+            y = factor * (record[c.name] - recognised.rest[coordinate.name])
             unit = c.guess if c.guess == "counts" else coordinate.unit
             places[coordinate.name] = Place(column=c.name, y=y, resolution=factor * c.resolution.step, unit=unit)
     return Case(

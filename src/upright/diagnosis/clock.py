@@ -170,23 +170,23 @@ def read_mended(path: PathLike, *, reader: str = "") -> tuple[Record, tuple[Find
     except BadInput as error:
         if "time must increase" not in str(error) or (reader or recognise(source)) != "table":
             raise
-    found = layout(source)
-    table = found.numbers()
-    at = next((j for j, name in enumerate(found.names) if found.named and time_scale(name)), 0)
-    t = table[:, at] * ((found.named and time_scale(found.names[at])) or 1.0)
+    text = layout(source)
+    table = text.numbers()
+    at = next((j for j, name in enumerate(text.names) if text.named and time_scale(name)), 0)
+    t = table[:, at] * ((text.named and time_scale(text.names[at])) or 1.0)
     step = np.diff(t)
     first, after = pieces(step < 0)[0]
     rows = first + np.flatnonzero(np.concatenate([[True], np.diff(t[first:after]) > 0]))
-    findings = _restarts(t, step, table, first, after, found.names)
-    return read_source(_rows(source, found.first_line, rows), reader="table"), findings
+    findings = _restarts(t, step, table, first, after, text.names)
+    return read_source(_rows(source, text.first_line, rows), reader="table"), findings
 
 
 def _rows(source: Source, first_line: int, rows: np.ndarray) -> Source:
     """The same log with some of its rows."""
     lines = source.text.split("\n")
     filled = [i for i in range(first_line - 1, len(lines)) if lines[i].strip()]
-    kept = [*lines[: first_line - 1], *(lines[filled[i]] for i in rows.tolist())]
-    return Source(file=source.file, data=("\n".join(kept) + "\n").encode())
+    remaining = [*lines[: first_line - 1], *(lines[filled[i]] for i in rows.tolist())]
+    return Source(file=source.file, data=("\n".join(remaining) + "\n").encode())
 
 
 def _restarts(

@@ -20,7 +20,7 @@ from upright.signals.trips import TripRegression
 from upright.study.draft.recognise import drive_column
 
 STILL = 0.1
-"""Seconds at the beginning in which a rig must lie still before its first motion can be told."""
+"""Seconds at the beginning in which a rig must lie still before its first motion can be detected."""
 
 
 def examine_effort(case: Case) -> list[Finding]:
@@ -30,7 +30,7 @@ def examine_effort(case: Case) -> list[Finding]:
 
 def _lies(case: Case) -> list[Finding]:
     """Columns that are not what their name says, as the reader's inspection found."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     chosen = drive_column(case.record, case.inspection)
     for c in case.inspection.columns:
         for lie in c.lies:
@@ -52,10 +52,10 @@ def _lies(case: Case) -> list[Finding]:
             elif lie.startswith("the first samples are outliers"):
                 kind, advice = "spike", "Leave the first samples out of the window."
                 key = f'window = [{case.record.t[min(3, len(case.record) - 1)]:.6g}, "end"]'
-            if not kind or any(f.columns == (c.name,) and f.kind == kind for f in found):
+            if not kind or any(f.columns == (c.name,) and f.kind == kind for f in findings):
                 continue
             driven = [c.name for c in case.measured][:1]
-            found.append(
+            findings.append(
                 Finding(
                     kind=kind,
                     columns=(c.name,),
@@ -68,7 +68,7 @@ def _lies(case: Case) -> list[Finding]:
                     panels=case.over_time(c.name, *driven),
                 )
             )  # fmt: skip
-    return found
+    return findings
 
 
 def _copies(case: Case) -> Iterator[Finding]:
@@ -114,8 +114,8 @@ def _constant(case: Case) -> Iterator[Finding]:
 def _limited(case: Case) -> Iterator[Finding]:
     """Effort cut off at its limit."""
     for c in case.inspection.columns:
-        asked = any(word in c.name.casefold() for word in ("command", "target", "ref"))
-        if not c.drive or c.constant or c.stepwise or asked:
+        reference = any(word in c.name.casefold() for word in ("command", "target", "ref"))
+        if not c.drive or c.constant or c.stepwise or reference:
             continue
         low, high, share = clipped(case.record[c.name], c.resolution.step, inertia=False)
         if share < 0.0002:

@@ -22,7 +22,7 @@ from upright.study.draft.suits import plants_that_suit
 from upright.study.sensors import Wiring
 
 HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
-"""Findings after which equations of motion are not asked, because they would only say the same again."""
+"""Findings after which equations of motion are not evaluated: they would only repeat them."""
 
 
 def examine(
@@ -48,16 +48,16 @@ def examine(
     inspection = inspect_record(record)
     wiring = wiring or Wiring()
     case = case_of(record, inspection, rig, wiring)
-    found = [*before, *examine_clock(case)]
+    findings = [*before, *examine_clock(case)]
     sensors, mended = examine_sensors(case)
     if mended is not None:
         case = replace(case_of(mended, inspection, rig, wiring), drive=case.drive, u=case.u)
-    found += [*sensors, *examine_effort(case), *examine_rest(case), *examine_settings(case)]
+    findings += [*sensors, *examine_effort(case), *examine_rest(case), *examine_settings(case)]
     unchecked = _unchecked(case)
-    forces, reasons = _forces(case, found)
+    forces, reasons = _forces(case, findings)
     if any(f.kind == "scale" for f in forces):  # what looks held is only read on another scale
-        found = [f for f in found if f.kind != "creep"]
-    found += forces
+        findings = [f for f in findings if f.kind != "creep"]
+    findings += forces
     unchecked |= reasons
     order = {s: i for i, s in enumerate(SEVERITIES)}
     return Diagnosis(
@@ -65,7 +65,7 @@ def examine(
         rig="" if rig is None else rig.name if isinstance(rig, Rig) else name_of(rig) or rig.__name__,
         samples=len(record),
         duration=inspection.time.duration,
-        findings=tuple(sorted(found, key=lambda f: order[f.severity])),
+        findings=tuple(sorted(findings, key=lambda f: order[f.severity])),
         checked=tuple(k for k in KINDS if k not in unchecked and (k != "settings" or _settings(case))),
         unchecked=unchecked,
         rigs=plants_that_suit(case.record, inspection) if rig is None else (),
@@ -84,7 +84,7 @@ def _unchecked(case: Case) -> dict[str, str]:
     elif case.u[0] != 0:
         out["early"] = f"'{case.drive}' acts from the first sample on"
     if case.plant is None:
-        out |= dict.fromkeys(("sign", "scale", "trip"), "nobody said what the rig is; name it with --rig")
+        out |= dict.fromkeys(("sign", "scale", "trip"), "the rig is not specified; name it with --rig")
     return out
 
 
@@ -92,18 +92,18 @@ def _settings(case: Case) -> bool:
     return any(n.startswith("runParameters") for n in case.inspection.notes)
 
 
-def _forces(case: Case, found: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
+def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[str, str]]:
     """What effort and motion say about each other, and why they do not where they do not."""
     if case.plant is None:
         return [], {}
-    spoilt = next((f for f in found if f.kind in HOPELESS and f.severity != "note" and f.spoils), None)
+    spoilt = next((f for f in findings if f.kind in HOPELESS and f.severity != "note" and f.spoils), None)
     motion: SmoothedMotion | str = (
         f"after the {spoilt.kind} found above, mend that first" if spoilt is not None else motion_of(case)
     )
     if isinstance(motion, str):
         return [], dict.fromkeys(("sign", "scale", "trip"), motion)
-    told = {f.columns for f in found if f.kind == "effort" and f.severity != "note"}
-    lying = (case.drive,) in told and not _in_dac(case)
+    blamed = {f.columns for f in findings if f.kind == "effort" and f.severity != "note"}
+    lying = (case.drive,) in blamed and not _in_dac(case)
     numbers = values_of(case, friction_of(case.plant))
     out: list[Finding] = []
     reasons: dict[str, str] = {}
@@ -127,7 +127,7 @@ def _forces(case: Case, found: list[Finding]) -> tuple[list[Finding], dict[str, 
         if not signed:
             reasons["sign"] = "the record holds no motion whose sign is known"
     out += [*trip, *conventions]
-    rough = any(f.kind in HOPELESS for f in found)  # accelerations are then too uneven to blame the effort
+    rough = any(f.kind in HOPELESS for f in findings)  # accelerations are then too uneven to blame the effort
     if not out and not rough and balance is not None and push is not None:
         out += against_gain(case, balance)
     if not out and not rough and push is not None:

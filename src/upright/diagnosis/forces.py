@@ -1,7 +1,7 @@
 """Do effort and motion obey the rig's equations? Signs, scales, silent trips, an effort that is none.
 
 The force that each equation of motion needs, ``M(q) a - f(q, v)``, is computed from the measured motion; what friction
-and the effort leave of it must be little. Then it is asked whether one sensor or the effort, times some factor, would
+and the effort leave of it must be little. Then it is tested whether one sensor or the effort, times some factor, would
 leave far less. No simulation, and no friction has to be known: it is regressed.
 """
 
@@ -133,7 +133,7 @@ class ForceBalance:
 
     def others(self) -> list[Explanation]:
         """The best factor on every sensor and on the effort, best first."""
-        found: list[Explanation] = []
+        explanations: list[Explanation] = []
         n = len(self.names)
         both = np.concatenate([COARSE, -COARSE])
         for i in self.motion.rows:
@@ -145,14 +145,14 @@ class ForceBalance:
                 best = finer
                 if settled:
                     break
-            found.append(best)
+            explanations.append(best)
         if self.used:
             one = np.ones((1, n))
             left, gains = self.explain(one, np.array([np.nan]) if math.isfinite(self.gain) else None)
             if math.isfinite(self.gain):
                 factor = float(gains[0]) / self.gain
-                found.append(Explanation(who="effort", factor=factor, unexplained=left[0], gain=float(gains[0])))
-        return sorted(found, key=lambda e: e.cost)
+                explanations.append(Explanation(who="effort", factor=factor, unexplained=left[0], gain=float(gains[0])))
+        return sorted(explanations, key=lambda e: e.cost)
 
     def _best(self, i: int, tried: Array, n: int) -> Explanation:
         factors = np.ones((tried.size, n))
@@ -303,9 +303,9 @@ def _force_panel(balance: ForceBalance, e: Explanation, title: str, *, like: Exp
     )
 
 
-def against_form(case: Case, motion: SmoothedMotion, found: list[Term]) -> list[Finding]:
+def against_form(case: Case, motion: SmoothedMotion, terms: list[Term]) -> list[Finding]:
     """Signs that the form of the equations fixes."""
-    clear = [x for x in found if x.share > MATTERS and x.total < 0.6]
+    clear = [x for x in terms if x.share > MATTERS and x.total < 0.6]
     wrong = [x for x in clear if x.slope < 0]
     if not wrong:
         return []
@@ -314,7 +314,7 @@ def against_form(case: Case, motion: SmoothedMotion, found: list[Term]) -> list[
     hangs = [x for x in wrong if x.who[0] == x.who[1]]
     thrown = any(x.text == "throw" for x in wrong)
     if thrown and not case.zeroed:  # a zero that is upright turns both signs, and a loop hides gravity's
-        hangs += [x for x in found if x.text == "gravity" and x.slope < 0 and x.share > 0.003]
+        hangs += [x for x in terms if x.text == "gravity" and x.slope < 0 and x.share > 0.003]
     if hangs:
         return [_upside_down(case, motion, hangs[0])]
     right_joined = [x for x in clear if x.who[0] not in ("effort", x.who[1]) and x not in wrong]

@@ -60,7 +60,7 @@ class SmoothedMotion:
 def motion_of(case: Case) -> SmoothedMotion | str:
     """Motion of a record, or the reason why there is none."""
     if case.plant is None:
-        return "nobody said what the rig is; name it with --rig"
+        return "the rig is not specified; name it with --rig"
     coordinates = [c.name for c in case.plant.coordinates]
     missing = [c for c in coordinates if c not in case.places and c not in case.locked]
     if case.chained and case.rig is None and case.places:
@@ -76,11 +76,11 @@ def motion_of(case: Case) -> SmoothedMotion | str:
         return str(error)
     y = {c: grid.outputs(p.y[start:stop]) for c, p in case.places.items()}
     u = grid.commands(case.u[start:stop]) if case.drive else np.zeros(grid.t.size)
-    told = case.rig is not None  # what is known of the rig then tells a wrong scale from a held body
+    known = case.rig is not None  # what is known of the rig then tells a wrong scale from a held body
     moving = tuple(
         c
         for c in coordinates
-        if c in y and np.ptp(y[c]) > 50 * told * case.places[c].resolution and (told or case.moves(c))
+        if c in y and np.ptp(y[c]) > 50 * known * case.places[c].resolution and (known or case.moves(c))
     )
     if not moving:
         return "nothing moves"

@@ -22,7 +22,7 @@ from upright.signals.stretches import stretches
 
 def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
     """Findings about each sensor, and the record with wraps, jumps and spikes taken out when there are any."""
-    found: list[Finding] = [*_dead(case)]
+    findings: list[Finding] = [*_dead(case)]
     mended: dict[str, Array] = {}
     for column in case.measured:
         if column.constant:
@@ -31,13 +31,13 @@ def examine_sensors(case: Case) -> tuple[list[Finding], Record | None]:
         jumped = jumps(case.record.t, x, column.resolution.step, case.moduli.get(column.name, ()))
         if tells_speed(column):
             jumped = replace(jumped, steps=jumped.steps[:0], step_sizes=jumped.step_sizes[:0])
-        found += _jumped(case, column, x, jumped)
+        findings += _jumped(case, column, x, jumped)
         if jumped:
             mended[column.name] = jumped.mended(x)
-        found += _frozen(case, column, mended.get(column.name, x))
-        found += _limited(case, column, x)
+        findings += _frozen(case, column, mended.get(column.name, x))
+        findings += _limited(case, column, x)
     record = case.record.replace(signals={**case.record.signals, **mended}) if mended else None
-    return found, record
+    return findings, record
 
 
 def _dead(case: Case) -> Iterator[Finding]:

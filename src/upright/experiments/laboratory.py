@@ -17,12 +17,12 @@ import numpy as np
 
 from upright._version import __version__
 from upright.errors import BadInput, UprightError
-from upright.experiments.abreast import run_abreast
+from upright.experiments.nonideal import nonideal as nonideal_twin
+from upright.experiments.parallel import run_parallel
 from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import TestStand
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.table import EXPERIMENTS, Experiment, ExperimentInput
-from upright.experiments.worn import worn as worn_twin
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import Book, Chapter, Step, as_plain, from_plain
@@ -59,13 +59,13 @@ class ExperimentResult:
 
 @dataclass(kw_only=True, eq=False)
 class Session:
-    """What has been told so far; it is filled experiment by experiment, so that an interrupted one can be reported."""
+    """Results so far; they are filled in experiment by experiment, so that an interrupted one can be reported."""
 
     make: str
     seed: int
     folder: Path
-    asked: tuple[Experiment, ...]
-    worn: bool = False
+    requested: tuple[Experiment, ...]
+    nonideal: bool = False
     live: LiveStand | None = None
     results: list[ExperimentResult] = field(default_factory=list[ExperimentResult])
     interrupted: bool = False
@@ -81,7 +81,7 @@ class Session:
         return _needs(e, self.make, self.live)
 
     def make_for(self, e: Experiment) -> str:
-        """Make on whose twin an experiment is run, or what the live rig is asked for by."""
+        """Make on whose twin an experiment is run, or the name of the live rig."""
         return self.make if self.live is not None else e.make(self.make)
 
     def stand(self, make: str) -> TestStand:
@@ -89,16 +89,16 @@ class Session:
         if self.live is not None:
             return self.live
         rig = make_rig(make, self.seed)
-        return TwinStand(rig=worn_twin(rig, self.seed) if self.worn else rig, make=MAKES[make])
+        return TwinStand(rig=nonideal_twin(rig, self.seed) if self.nonideal else rig, make=MAKES[make])
 
     @property
     def missing(self) -> tuple[Experiment, ...]:
-        """What was asked for and not begun."""
-        return tuple(e for e in self.asked if e.key not in {t.experiment.key for t in self.results})
+        """What was requested and not begun."""
+        return tuple(e for e in self.requested if e.key not in {t.experiment.key for t in self.results})
 
 
-def chosen_experiments(asked: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
-    """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
+def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
+    """The requested experiments, with those whose numbers they take; all that the rig has when none is named.
 
     Raises
     ------
@@ -112,21 +112,21 @@ def chosen_experiments(asked: Sequence[str], make: str, live: LiveStand | None =
             "study: name that."
         )
     wanted: set[str] = set()
-    for name in asked:
-        found = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
-        if not found:
+    for name in requested:
+        named = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
+        if not named:
             valid = dict.fromkeys(n for e in EXPERIMENTS for n in (e.part_of, e.key))
             raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
-        if not any(e in there for e in found):
+        if not any(e in there for e in named):
             has = f"has experiments {', '.join(e.key for e in there)}"
             if live is not None:
                 raise BadInput(
                     f"experiment {name} cannot be made on {make}, which {has}; "
                     "docs/lab.md says what each asks of a rig."
                 )
-            raise BadInput(f"experiment {name} is for --rig {' or '.join(found[0].makes)}; {make} {has}.")
-        wanted |= {e.key for e in found if e in there}
-    if not asked:
+            raise BadInput(f"experiment {name} is for --rig {' or '.join(named[0].makes)}; {make} {has}.")
+        wanted |= {e.key for e in named if e in there}
+    if not requested:
         wanted = {e.key for e in there}
     for e in reversed(there):  # who builds on another comes after it
         if e.key in wanted:
@@ -149,7 +149,7 @@ def _needs(e: Experiment, make: str, live: LiveStand | None) -> list[str]:
 
 
 def run_laboratory(
-    asked: Sequence[str],
+    requested: Sequence[str],
     make: str,
     seed: int,
     folder: Path,
@@ -158,14 +158,14 @@ def run_laboratory(
     *,
     fresh: bool = False,
     workers: Workers = HERE,
-    worn: bool = False,
+    nonideal: bool = False,
     live: LiveStand | None = None,
 ) -> Session:
     """Run experiments on a seeded rig; Ctrl-C stops and keeps what is there.
 
     Parameters
     ----------
-    asked : sequence of str
+    requested : sequence of str
         Experiments by name, all when empty.
     make : str
         Kind of rig; empty for the one on which the paper did each.
@@ -174,17 +174,17 @@ def run_laboratory(
     folder : Path
         Takes a folder for each experiment. What is there and still holds is not made again.
     progress : callable, optional
-        Told the step at work and the share of the whole.
+        Called with the current step and the share of the whole.
     stopped : callable, optional
         Whether Ctrl-C was pressed, for what has swallowed it.
     fresh : bool
         Make everything again.
     workers : Workers, optional
         Who runs experiments that need nothing of each other; processes of this machine, since they share the folder.
-    worn : bool
-        Take twins with physics that models leave out; see `upright.experiments.worn`.
+    nonideal : bool
+        Take twins with physics that models leave out; see `upright.experiments.nonideal`.
     live : LiveStand, optional
-        The rig itself, where it is no twin that is simulated here; `make` is then what it is asked for by.
+        The rig itself, where it is no twin that is simulated here; `make` is then its name.
 
     Raises
     ------
@@ -193,14 +193,19 @@ def run_laboratory(
     """
     began = time.perf_counter()
     session = Session(
-        make=make, seed=seed, folder=folder, asked=chosen_experiments(asked, make, live), worn=worn, live=live
+        make=make,
+        seed=seed,
+        folder=folder,
+        requested=chosen_experiments(requested, make, live),
+        nonideal=nonideal,
+        live=live,
     )
     digests = _digests(session)
-    whole = sum(e.seconds for e in session.asked)
+    whole = sum(e.seconds for e in session.requested)
     behind = 0.0
     if not workers.alone:
-        _run_abreast(session, digests, workers, progress, stopped, fresh)
-    for e in session.asked if workers.alone else ():
+        _run_parallel(session, digests, workers, progress, stopped, fresh)
+    for e in session.requested if workers.alone else ():
 
         def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
             progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
@@ -213,20 +218,20 @@ def run_laboratory(
         if session.interrupted:
             break
         behind += e.seconds
-    session.results = _with_kept(session, digests)
+    session.results = _with_stored(session, digests)
     session.seconds = time.perf_counter() - began
     return session
 
 
-def _run_abreast(
+def _run_parallel(
     session: Session, digests: Mapping[str, str], workers: Workers, progress: Progress, stopped: Callable[[], bool],
     fresh: bool,
 ) -> None:  # fmt: skip
-    asked = {e.key: e for e in session.asked}
-    needs = {key: session.needs(e) for key, e in asked.items()}
-    run = partial(_apart, replace(session, asked=()), digests, stopped, fresh)
-    found, interrupted = run_abreast({k: e.seconds for k, e in asked.items()}, needs, run, workers, progress)
-    session.results += [_brought(key, told) for key, told in found.items()]
+    requested = {e.key: e for e in session.requested}
+    needs = {key: session.needs(e) for key, e in requested.items()}
+    run = partial(_apart, replace(session, requested=()), digests, stopped, fresh)
+    contents, interrupted = run_parallel({k: e.seconds for k, e in requested.items()}, needs, run, workers, progress)
+    session.results += [_brought(key, content) for key, content in contents.items()]
     session.interrupted = interrupted or any(t.state == "stopped" for t in session.results)
 
 
@@ -235,16 +240,16 @@ def _apart(
     earlier: Mapping[str, Mapping[str, Any]], progress: Progress,
 ) -> dict[str, Any]:  # fmt: skip
     """One experiment in another process: an `ExperimentResult` as plain values, its pictures drawn."""
-    results = [_brought(k, told) for k, told in earlier.items()]
+    results = [_brought(k, content) for k, content in earlier.items()]
     e = next(e for e in EXPERIMENTS if e.key == key)
-    done = _one(replace(session, results=results), e, digests[key], progress, stopped, fresh)
-    return {**vars(done), "experiment": key, "chapter": as_plain(done.chapter)}
+    result = _one(replace(session, results=results), e, digests[key], progress, stopped, fresh)
+    return {**vars(result), "experiment": key, "chapter": as_plain(result.chapter)}
 
 
-def _brought(key: str, told: Mapping[str, Any]) -> ExperimentResult:
+def _brought(key: str, content: Mapping[str, Any]) -> ExperimentResult:
     """The result that came from there."""
     e = next(e for e in EXPERIMENTS if e.key == key)
-    values: dict[str, Any] = {**told, "experiment": e, "chapter": from_plain(told["chapter"])}
+    values: dict[str, Any] = {**content, "experiment": e, "chapter": from_plain(content["chapter"])}
     return ExperimentResult(**values)
 
 
@@ -260,7 +265,7 @@ def _digests(session: Session) -> dict[str, str]:
             e.key,
             session.make_for(e),
             str(session.seed),
-            "worn" if session.worn else "",
+            "nonideal" if session.nonideal else "",
             *(digests[n] for n in session.needs(e)),
         )
         digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
@@ -286,7 +291,7 @@ def _program() -> str:
     return digest.hexdigest()
 
 
-def _kept(folder: Path, digest: str) -> Chapter | None:
+def _stored(folder: Path, digest: str) -> Chapter | None:
     """The chapter of an earlier run, or nothing when there is none or it was made of something else."""
     try:
         content: Any = json.loads(read_text(folder / CHAPTER_FILE))
@@ -295,16 +300,20 @@ def _kept(folder: Path, digest: str) -> Chapter | None:
         return None
 
 
-def _with_kept(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
-    """What was told, and what else is there from an earlier run on the same rig."""
-    told = {t.experiment.key: t for t in session.results}
+def _with_stored(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
+    """The results, and what else is stored of an earlier run on the same rig."""
+    results = {t.experiment.key: t for t in session.results}
     for e in session.there:
-        found = None if e.key in told else _kept(session.folder / e.key, _with_measured(session, e, digests[e.key]))
-        if found:
+        stored = (
+            None if e.key in results else _stored(session.folder / e.key, _with_measured(session, e, digests[e.key]))
+        )
+        if stored:
             make = session.make_for(e)
             name = session.stand(make).rig.name
-            told[e.key] = ExperimentResult(experiment=e, make=make, rig=name, chapter=found, state="kept", seconds=0.0)
-    return [told[e.key] for e in session.there if e.key in told]
+            results[e.key] = ExperimentResult(
+                experiment=e, make=make, rig=name, chapter=stored, state="kept", seconds=0.0
+            )
+    return [results[e.key] for e in session.there if e.key in results]
 
 
 def _one(
@@ -317,7 +326,7 @@ def _one(
     digest = _with_measured(session, e, digest)
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
-    state, chapter = "kept", None if fresh else _kept(folder, digest)
+    state, chapter = "kept", None if fresh else _stored(folder, digest)
     if chapter is None:
         at = ExperimentInput(
             stand=stand, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
@@ -347,9 +356,9 @@ def _failed(e: Experiment, why: str) -> Chapter:
     return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)
 
 
-WORN = (
-    "They are worn: friction larger close to rest, a drive that ripples and comes late, a frame out of level, encoders "
-    "with play and off centre. No model has this, and what remains of it is told."
+NONIDEAL = (
+    "They have unmodelled effects: friction larger close to rest, a drive that ripples and lags, a tilted frame, "
+    "encoders with play and off centre. No model has this; what remains of it is reported."
 )
 TWINS = "Digital twins: dry friction, encoder counts, delay and limits as on rigs; none was touched."
 TITLE = "The laboratory: identify it hanging, hold it upright"
@@ -371,7 +380,7 @@ def book(session: Session, day: date) -> Book:
         title=TITLE,
         facts=(
             ("Rig", "; ".join(rigs) or (session.make if live is not None else f"seed {session.seed}")),
-            ("Data", live.source if live is not None else TWINS + (f" {WORN}" if session.worn else "")),
+            ("Data", live.source if live is not None else TWINS + (f" {NONIDEAL}" if session.nonideal else "")),
             ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
             ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
             ("Again", typed_again(session)),
@@ -392,13 +401,13 @@ def typed_again(session: Session, seed: int | None = None) -> str:
     if session.make:
         shown.append(f"--rig {session.make}")
     there = session.there
-    told = {e.key for e in session.asked} | {t.experiment.key for t in session.results}
-    if len(told) < len(there):
-        shown += [f"--experiment {e.key}" for e in there if e.key in told]
+    keys = {e.key for e in session.requested} | {t.experiment.key for t in session.results}
+    if len(keys) < len(there):
+        shown += [f"--experiment {e.key}" for e in there if e.key in keys]
     if seed:
         shown.append(f"--seed {seed}")
-    if session.worn:
-        shown.append("--worn")
+    if session.nonideal:
+        shown.append("--nonideal")
     return " ".join(shown)
 
 
@@ -418,7 +427,7 @@ def next_steps(session: Session) -> tuple[Step, ...]:
             again = f"upright run --rig {typed(rig)} --law {typed(law)} --duration 60"
             steps.append(Step("Run the best law for longer.", again))
         return tuple(steps)
-    steps.append(Step("Take another rig of the same make.", typed_again(session, session.seed + 1)))
+    steps.append(Step("Take another rig of the same model.", typed_again(session, session.seed + 1)))
     other = "linear" if session.make != "linear" else "furuta"
     steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))
     steps.append(Step("Start on a log of your own.", "upright init LOG"))
@@ -430,7 +439,7 @@ def session_summary(session: Session, report: Path, pdf: Path | None) -> dict[st
     return {
         "seed": session.seed,
         "rig": session.make or None,
-        "worn": session.worn,
+        "nonideal": session.nonideal,
         "folder": str(session.folder),
         "report": str(report),
         "pdf": str(pdf) if pdf else None,

@@ -1,4 +1,4 @@
-"""The experiments of the paper, each told once: what it needs of a rig, and how it is made on whichever test stand."""
+"""The experiments of the paper, each declared once: what it needs of a rig, and how any test stand runs it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from upright.rig.makes import MAKES, PENDULUMS, SHAFTS
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentInput:
-    """What an experiment is given: test stand and folder, what finished ones it builds on said and where they wrote."""
+    """What an experiment is given: test stand and folder, results and folders of those it builds on."""
 
     stand: TestStand
     seed: int
@@ -48,8 +48,12 @@ class ExperimentInput:
     def estimated(self, key: str, name: str) -> tuple[Known, ...]:
         """What the fit of an earlier experiment says of a parameter, if anything."""
         chapter = self.earlier.get(key)
-        told = chapter.numbers.get("parameters", {}).get(name) if chapter else None
-        return (Known(name=name, value=told["value"], stderr=told["stderr"]),) if told and told.get("stderr") else ()
+        estimate = chapter.numbers.get("parameters", {}).get(name) if chapter else None
+        return (
+            (Known(name=name, value=estimate["value"], stderr=estimate["stderr"]),)
+            if estimate and estimate.get("stderr")
+            else ()
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +63,7 @@ class Experiment:
     Attributes
     ----------
     key : str
-        As it is asked for and as its folder is named.
+        Its name on the command line and of its folder.
     part_of : str
         Asking for this brings it as well: ``1`` means 1a and 1b.
     title : str
@@ -85,9 +89,9 @@ class Experiment:
     seconds: float
     tell: Callable[[ExperimentInput], tuple[Chapter, bool]]
 
-    def make(self, asked: str) -> str:
-        """Make that it is run on where one is asked for, or none."""
-        return asked if asked in self.makes else self.makes[0]
+    def make(self, requested: str) -> str:
+        """Rig model that it is run on where one is requested, or none."""
+        return requested if requested in self.makes else self.makes[0]
 
 
 def _weighing(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -102,10 +106,10 @@ def _frequency(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.frequency_1b.run import run_frequency
 
     if at.stand.simulated:  # where nobody waits for sines, one after the other
-        done = run_frequency(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
-        return chapter(done), True
-    asked = run_at_once(at.stand, at.folder, at.progress, at.weighed)
-    return at_once_chapter(asked, at.folder, at.stand.truth), not asked.fit.interrupted
+        result = run_frequency(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+        return chapter(result), True
+    measured = run_at_once(at.stand, at.folder, at.progress, at.weighed)
+    return at_once_chapter(measured, at.folder, at.stand.truth), not measured.fit.interrupted
 
 
 def _identified(at: ExperimentInput, stand: TestStand) -> tuple[Rig, Rig]:
@@ -124,8 +128,8 @@ def _regulation(at: ExperimentInput) -> tuple[Chapter, bool]:
 
     stand = at.stand.described_by(at.fit, at.folder)
     _, model = _identified(at, stand)
-    done = run_regulation(model, stand, at.seed, at.folder, at.progress, at.stopped, source=typed(at.fit))
-    return chapter(done), not done.interrupted
+    result = run_regulation(model, stand, at.seed, at.folder, at.progress, at.stopped, source=typed(at.fit))
+    return chapter(result), not result.interrupted
 
 
 def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -134,10 +138,10 @@ def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
 
     stand = at.stand.described_by(at.fit, at.folder)
     known, model = _identified(at, stand)
-    done = run_swing_up(
+    result = run_swing_up(
         model, stand, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
     )  # fmt: skip
-    return chapter(done), not at.stopped()
+    return chapter(result), not at.stopped()
 
 
 def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -145,11 +149,11 @@ def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.tracking_3.run import run_tracking, track_on
 
     if at.stand.simulated:
-        done = run_tracking(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
+        result = run_tracking(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=at.weighed)
     else:
         stand = at.stand.described_by(at.fit, at.folder)
-        done = track_on(stand.rig, stand, at.folder, None, None, at.progress, at.stopped)
-    return chapter(done), not done.interrupted
+        result = track_on(stand.rig, stand, at.folder, None, None, at.progress, at.stopped)
+    return chapter(result), not result.interrupted
 
 
 def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
@@ -164,11 +168,11 @@ def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
         study, fit = run_by_hand(at.stand, at.folder, at.progress, at.estimated("1b", body))
         return fit_chapter(study, fit, at.folder, at.stand.truth), not fit.interrupted
     weighed = next((k for k in at.weighed if k.name == body), None)
-    done = run_free_swing(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
-    if "free_swing" in done.answers:
-        first = done.answers["free_swing"]
+    result = run_free_swing(at.stand.rig, at.seed, at.folder, at.progress, at.stopped, weighed=weighed)
+    if "free_swing" in result.answers:
+        first = result.answers["free_swing"]
         write_fit(first.fit, first.study, at.folder / "fit.json")
-    return chapter(done), not done.interrupted
+    return chapter(result), not result.interrupted
 
 
 def _carries_pendulum(stand: TestStand) -> bool:
@@ -177,7 +181,7 @@ def _carries_pendulum(stand: TestStand) -> bool:
 
 
 def _is_shaft(stand: TestStand) -> bool:
-    return any(isinstance(stand.rig.plant, type(MAKES[key].plant)) for key in SHAFTS)
+    return any(isinstance(stand.rig.plant, type(MAKES[key].rig.plant)) for key in SHAFTS)
 
 
 EXPERIMENTS: tuple[Experiment, ...] = (
@@ -208,4 +212,4 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         seconds=9.0, tell=_free_swing,
     ),
 )  # fmt: skip
-"""In the order in which they are run and told."""
+"""In the order in which they are run and reported."""

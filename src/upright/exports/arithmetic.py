@@ -109,15 +109,15 @@ def statements(made: SampledController, say: Language) -> list[str]:
         beyond = f" {say.either} ".join(f"{say.absolute}(c{j}) > {say.number(limit)}" for j in range(len(C)))
         put(f"{say.let}beyond = {beyond}", "sums then stand still")
     for j in range(len(C)):
-        put(_given(j, limit, say))
+        put(_put_out(j, limit, say))
     for i, (a, b) in enumerate(zip(A, B, strict=True)):
         terms = _terms([*a, *b], [*memory, *signals], say)
         remark = "" if i else "what is remembered until the next sample"
         put(f"{say.let}n{i} = {' + '.join(terms) or say.number(0.0)}", remark)
     for i, row in enumerate(A):
-        kept = f"{say.memory(i)} = n{i}{say.end}"
+        line = f"{say.memory(i)} = n{i}{say.end}"
         stands = hold and all(value == float(i == j) for j, value in enumerate(row))
-        lines += say.hold(kept) if stands else [kept]
+        lines += say.hold(line) if stands else [line]
     return lines
 
 
@@ -136,8 +136,8 @@ def _check_commands(made: SampledController, say: Language) -> list[str]:
 def output_lines(made: SampledController, say: Language) -> list[str]:
     """What becomes of the commands c0, c1, ... of a rule."""
     rounded = [_rounded(j, step, say) for j, step in enumerate(made.converter.tolist()) if step]
-    given = [_given(j, made.law.limit, say) for j in range(len(made.commands))]
-    return [*_check_commands(made, say), *(f"{line}{say.end}" for line in (*rounded, *given))]
+    commands = [_put_out(j, made.law.limit, say) for j in range(len(made.commands))]
+    return [*_check_commands(made, say), *(f"{line}{say.end}" for line in (*rounded, *commands))]
 
 
 def _scaled(j: int, step: float, say: Language) -> str:
@@ -148,7 +148,7 @@ def _rounded(j: int, step: float, say: Language) -> str:
     return f"c{j} = {say.floor}({_scaled(j, step, say)} + {say.number(0.5)}) * {say.number(step)}"
 
 
-def _given(j: int, limit: float, say: Language) -> str:
+def _put_out(j: int, limit: float, say: Language) -> str:
     limited = say.limited(f"c{j}", say.number(limit)) if math.isfinite(limit) else f"c{j}"
     return f"{say.command(j)} = {limited}"
 

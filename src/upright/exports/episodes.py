@@ -66,7 +66,7 @@ class Episodes:
             raise BadInput(f"a command is held for 1e-4 to 1 s, got {period:g} s; 0.02 is usual.")
         if lanes < 1:
             raise BadInput(f"an environment has at least one lane, got {lanes}.")
-        points, said = rig.plant.equilibria, rig.hardware
+        points, hardware = rig.plant.equilibria, rig.hardware
         at = at or list(points)[-1]
         if at not in points:
             raise BadInput(f"'{rig.name}' has no equilibrium '{at}'; {nearest(at, points)}")
@@ -78,7 +78,7 @@ class Episodes:
                 f"an environment needs a drive and a pendulum that hangs or stands, and a '{rig.name}' has none; "
                 "simulate it with upright.simulate."
             )
-        if said.value("relaxation", 0.0):
+        if hardware.value("relaxation", 0.0):
             raise BadInput(
                 "braking that builds up (actuator.relaxation) is remembered from step to step, which an environment "
                 "does not; identify without it, or set it to 0 in the fit."
@@ -86,12 +86,12 @@ class Episodes:
         for what, value in (("limit", limit), ("travel", travel)):
             if value is not None and not 0 < value < 1e9:
                 raise BadInput(f"the {what} of an environment lies above 0 and below 1e9, got {value:g}.")
-        most = limit or min(said.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
+        most = limit or min(hardware.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
         if not math.isfinite(most):
             raise BadInput("an environment needs the largest command: limit=10, or [actuator] limit in the study.")
         self.rig, self.lanes, self.task, self.period, self.limit, self.threads = rig, lanes, task, period, most, threads
         driven = names.index(rig.plant.inputs[0].on)
-        self.travel = np.where(np.arange(len(names)) == driven, travel or said.value("travel", math.inf), math.inf)
+        self.travel = np.where(np.arange(len(names)) == driven, travel or hardware.value("travel", math.inf), math.inf)
         hanging = rig.plant.equilibrium(next(iter(points)))
         self.begin = self.target if task == "balance" else np.array([hanging[n] for n in names])
         self.x = np.zeros((2 * len(names), lanes))
@@ -194,8 +194,8 @@ class Episodes:
         out, k = np.empty((len(self.names), self.lanes), dtype=np.float32), 0
         for i, turns in enumerate(self.turning.tolist()):
             off = (self.x[2 * i] - self.target[i]).astype(np.float32)
-            for seen in (np.sin(off), np.cos(off)) if turns else (off,):
-                out[k], k = seen, k + 1
+            for value in (np.sin(off), np.cos(off)) if turns else (off,):
+                out[k], k = value, k + 1
         out[k:] = self.x[1::2]
         return out.T
 

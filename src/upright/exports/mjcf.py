@@ -32,14 +32,14 @@ def model(rig: Rig, *, timestep: float = 1e-3) -> tuple[str, tuple[str, ...]]:
     """
     p: Any = rig.plant
     bodies, tendons, gravity = _bodies(p, rig.name)
-    told = [*_left_out(rig)]
+    remarks = [*_left_out(rig)]
     if isinstance(p, DoublePendulumAbsolute):
-        told.append("Joint theta_2_relative is theta_2 - theta_1: joints of MJCF turn against the body they are on.")
+        remarks.append("Joint theta_2_relative is theta_2 - theta_1: joints of MJCF turn against the body they are on.")
     return (
         f"""\
 <mujoco model="{rig.name.rpartition(":")[2]}">
   <!-- Written by upright export. Joints are the coordinates: SI and radians, angles as the plant counts them. -->
-{"".join(f"  <!-- {line} -->{chr(10)}" for line in (*_first_line(rig), *told))}\
+{"".join(f"  <!-- {line} -->{chr(10)}" for line in (*_first_line(rig), *remarks))}\
   <compiler angle="radian" autolimits="false" inertiafromgeom="false" balanceinertia="false"/>
   <option timestep="{timestep!r}" integrator="RK4" gravity="{_vector(gravity)}"><flag contact="disable"/></option>
   <worldbody>
@@ -50,7 +50,7 @@ def model(rig: Rig, *, timestep: float = 1e-3) -> tuple[str, tuple[str, ...]]:
   </actuator>
 </mujoco>
 """,
-        tuple(told),
+        tuple(remarks),
     )
 
 
@@ -115,9 +115,9 @@ def _chained(p: Any, v: Mapping[str, float], name: str) -> tuple[str, str, tuple
 def _actuator(rig: Rig) -> str:
     """The drive: its gain, limits, lag, and what it loses with speed."""
     out: list[str] = []
-    drive, said = rig.more, rig.hardware
+    drive, hardware = rig.more, rig.hardware
     lost = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
-    limit, most = said.value("limit", math.inf), drive.get("actuator.force_limit", math.inf)
+    limit, most = hardware.value("limit", math.inf), drive.get("actuator.force_limit", math.inf)
     for force in rig.plant.inputs:
         lag = f' dyntype="filter" dynprm="{rig.lag!r}"' if rig.lag else ""
         ranges = f' ctrllimited="true" ctrlrange="{-limit!r} {limit!r}"' if math.isfinite(limit) else ""
@@ -139,10 +139,10 @@ def _left_out(rig: Rig) -> list[str]:
         of = [j.on for j in rig.plant.joints if v.get(getattr(j, name), 0.0)]
         if of:
             out.append(f"Left out: {words} of {', '.join(of)}.")
-    said = rig.hardware
+    hardware = rig.hardware
     for name, words in _DRIVE.items():
         idle = math.inf if name == "knee" else 0.0
-        if said.value(name, idle) != idle:
+        if hardware.value(name, idle) != idle:
             out.append(f"Left out: {words}.")
     if any(rig.more.get(f"actuator.{n}") for n in ("damping", "standby")):
         out.append("Approximate: the drive brakes whether it is commanded or not.")

@@ -95,8 +95,8 @@ class _Plain(ast.NodeTransformer):
     def visit_Return(self, node: ast.Return) -> ast.Return:
         if not isinstance(node.value, ast.Tuple) or len(node.value.elts) != 2:
             raise _refusal(node)
-        commands, kept = map(self._items, node.value.elts)
-        return ast.Return(ast.Tuple([*commands, *kept], ast.Load()))
+        commands, memory = map(self._items, node.value.elts)
+        return ast.Return(ast.Tuple([*commands, *memory], ast.Load()))
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         size = self._size(node.value)
@@ -110,12 +110,12 @@ class _Plain(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         match node:
-            case ast.Call(func=ast.Name(id="len"), args=[given]) if self._size(given) is not None:
-                return ast.Constant(self._size(given))
-            case ast.Call(func=ast.Name(id="min" | "max") as function, args=[given]):
-                return self._least(function, self._items(given))
-            case ast.Call(func=ast.Name(id="min" | "max") as function, args=[_, _, *_] as given):
-                return self._least(function, [self.visit(x) for x in given])
+            case ast.Call(func=ast.Name(id="len"), args=[argument]) if self._size(argument) is not None:
+                return ast.Constant(self._size(argument))
+            case ast.Call(func=ast.Name(id="min" | "max") as function, args=[argument]):
+                return self._least(function, self._items(argument))
+            case ast.Call(func=ast.Name(id="min" | "max") as function, args=[_, _, *_] as argument):
+                return self._least(function, [self.visit(x) for x in argument])
             case _:
                 return self.generic_visit(node)  # type: ignore[return-value]
 

@@ -16,7 +16,7 @@ from upright.simulation import Held, simulate
 SAMPLES = 48
 """Few enough for the 2 kB of a small microcontroller, enough for every memory to be filled and the limit to be met."""
 BEYOND = 1.5
-"""Largest command asked for, in limits, so that some samples are limited and most are not."""
+"""Largest requested command, in limits, so that some samples are limited and most are not."""
 SINGLE = 2.0**-24
 """Unit roundoff of IEEE single precision."""
 
@@ -121,7 +121,7 @@ def _single_precision(made: SampledController, law: Law, readings: Array) -> flo
     roundings = (A.shape[0] + D.shape[1] + 2) * SINGLE
     free = replace(law, limit=math.inf, command_resolution=0.0, target=0.0, initial=None, delay=0.0, windup="free")
     moved = np.abs(replace(free, references=_rounding(signal)).follow(_rounding(readings) - _rounding(target))[0])
-    asked = memory @ law.C.T + w @ law.D.T
+    commands = memory @ law.C.T + w @ law.D.T
     jump = np.abs(memory @ law.A.T + w @ law.B.T - memory) * (law.windup == "hold")
     begin = 0.0 if law.begin is None else np.abs(law.begin) @ np.abs(w[0, :p])
     # what a sample adds to the error of the memory, and what that is later, by the samples in between
@@ -132,13 +132,13 @@ def _single_precision(made: SampledController, law: Law, readings: Array) -> flo
         error = moved[k] + roundings * (C @ np.abs(memory[k]) + D @ np.abs(w[k])) + SINGLE * (D @ np.abs(w[k]))
         error = error + sum((m @ e for m, e in zip(reversed(later), added, strict=True)), np.zeros(len(C)))
         worst = np.maximum(worst, error)
-        near = bool((np.abs(np.abs(asked[k]) - law.limit) <= error + step).any())
+        near = bool((np.abs(np.abs(commands[k]) - law.limit) <= error + step).any())
         summed = A @ np.abs(memory[k]) + B @ np.abs(w[k])
         added.append(roundings * summed + SINGLE * (B @ np.abs(w[k])) + near * jump[k])
         power = law.A @ power
         later.append(np.abs(law.C @ power))
     on_steps = np.where(step > 0, step * np.ceil(worst / np.where(step > 0, step, 1.0)), worst)
-    return float(on_steps.max(initial=0.0)) + 4 * SINGLE * min(law.limit, float(np.abs(asked).max(initial=0.0)))
+    return float(on_steps.max(initial=0.0)) + 4 * SINGLE * min(law.limit, float(np.abs(commands).max(initial=0.0)))
 
 
 def _rounding(values: Array) -> Array:

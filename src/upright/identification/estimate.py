@@ -25,6 +25,7 @@ from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
+from upright.identification.inference.ties import ties, with_ties
 from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
@@ -75,14 +76,14 @@ def identify(
     Parameters
     ----------
     rig : GreyBox
-        Plant, what is known and what is asked.
+        Plant, what is known and what is to be estimated.
     runs : sequence of Run
         Those with role ``"fit"`` are explained together; those with role ``"predict"`` are only scored, with the
         parameters fixed.
     method : {"auto", "least-squares", "simplex"}
         See `METHODS`.
     progress : callable, optional
-        Told the stage, its cost and its number of simulations, and the share done.
+        Called with the stage, its cost and number of simulations, and the share completed.
     watch : bool
         Whether stretches that something else than the input moved are named, and left out in a second fit.
     near : Fit, optional
@@ -97,7 +98,7 @@ def identify(
     Raises
     ------
     BadInput
-        When no run may be fitted, nothing is asked, or a name does not exist.
+        When no run may be fitted, nothing is to be estimated, or a name does not exist.
     """
     return _identify(rig, runs, method, progress, watch=watch, near=near)
 
@@ -106,7 +107,7 @@ def _identify(
     rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
     conventions: Callable[[], Sequence[str]] | None = None, moments: Moments | None = None,
 ) -> Fit:  # fmt: skip
-    """As `identify`; a fit without outliers is told of `conventions` and `moments` what all samples look like."""
+    """As `identify`; a fit without outliers knows `conventions` and `moments` of all samples."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
     moments = moments or Moments(rig)
@@ -115,36 +116,36 @@ def _identify(
     log = SearchLog(progress=progress, conventions=conventions or cache(lambda: wrong_conventions(rig, fitted)))
     log.warnings += unasked_trips(rig, fitted, moments)
     try:
-        problem, found = find_optimum(rig, fitted, method, log, near)
+        problem, optimum = find_optimum(rig, fitted, method, log, near)
     except KeyboardInterrupt:
         problem, x = _best_so_far(rig, fitted, log)
-        found = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
+        optimum = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
 
-    def conclude(found: Descent) -> Fit:
-        fit = _conclude(rig, runs, problem, found, log, watch=watch)
+    def conclude(end: Descent) -> Fit:
+        fit = _conclude(rig, runs, problem, end, log, watch=watch)
         return replace(fit, method=method, seconds=time.perf_counter() - began)
 
     try:
-        fit = conclude(found)
+        fit = conclude(optimum)
         for _ in range(LOWER):
             if log.lower is None or log.lower[0] is not problem or fit.interrupted:
                 break
-            found = descend(problem.normal, log.lower[2], problem.lower, problem.upper, tolerance=1e-6)
-            log.note("lower, met by an interval", found.normal.cost, problem)
+            optimum = descend(problem.normal, log.lower[2], problem.lower, problem.upper, tolerance=1e-6)
+            log.note("lower, met by an interval", optimum.normal.cost, problem)
             log.lower = None
-            fit = conclude(other_valleys(problem, found, log))
+            fit = conclude(other_valleys(problem, optimum, log))
         if not watch or fit.interrupted or fit.failed:
             return fit
         fit = refit_without_outliers(
             fit, rig, runs,
-            lambda kept: _identify(
-                rig, kept, method, progress, watch=False, near=fit, conventions=log.conventions, moments=moments
+            lambda left: _identify(
+                rig, left, method, progress, watch=False, near=fit, conventions=log.conventions, moments=moments
             ),
         )  # fmt: skip
         explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
         return fit if explained or log.conventions() else with_proposal(fit, fitted)
     except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
-        return conclude(replace(found, interrupted=True))
+        return conclude(replace(optimum, interrupted=True))
 
 
 def find_optimum(
@@ -153,40 +154,40 @@ def find_optimum(
     """The problem whose model was chosen, and where its cost is least."""
     problem = formulate(rig, runs)
     if near is not None and not any(e.status == "left out" for e in near.estimates.values()):
-        found = descend_progressively(problem, problem.place(near.keyed()), log, horizon=math.inf)
+        end = descend_progressively(problem, problem.place(near.keyed()), log, horizon=math.inf)
     elif method == "auto":
         chosen, candidates = choose_friction(rig, runs, log)
         if chosen is not rig:
             problem = formulate(chosen, runs)
-        found = search(problem, candidates, log)
+        end = search(problem, candidates, log)
     elif method == "simplex":
         x = problem.start
         for horizon in (min(problem.duration, 2 * first_horizon(problem)), math.inf):
             x, cost = simplex(problem, x, log, horizon=horizon, limit=200 * x.size, keep=True)
             log.note("simplex", cost, problem)
-        found = descend_progressively(problem, x, log, horizon=math.inf)
+        end = descend_progressively(problem, x, log, horizon=math.inf)
     else:
-        found = descend_progressively(problem, problem.start, log)
-        log.best = problem, found.x
-        if found.normal.cost > POOR * problem.count() and not found.interrupted:
+        end = descend_progressively(problem, problem.start, log)
+        log.best = problem, end.x
+        if end.normal.cost > POOR * problem.count() and not end.interrupted:
             starts = [problem.place(s) for s in closed_form_starts(rig, runs)]
-            other = search(problem, starts, log, patient=False) if starts else found
-            found = better(found, other)
-    if not math.isfinite(found.normal.cost):  # the motion runs away wherever the search came: nothing to refine
-        return problem, found
-    found = settle_weights(problem, other_moments(problem, found, log))
-    found = reached_limits(problem, found, log)
-    log.unresolved = () if found.interrupted else unresolved(problem, found.x)
-    log.unreached = () if found.interrupted else unreached(problem, found.x)
+            other = search(problem, starts, log, patient=False) if starts else end
+            end = better(end, other)
+    if not math.isfinite(end.normal.cost):  # the motion runs away wherever the search came: nothing to refine
+        return problem, end
+    end = settle_weights(problem, other_moments(problem, end, log))
+    end = reached_limits(problem, end, log)
+    log.unresolved = () if end.interrupted else unresolved(problem, end.x)
+    log.unreached = () if end.interrupted else unreached(problem, end.x)
     if log.unresolved or log.unreached:  # kept at their bound they would bias everything else, or what is predicted
         whole = formulate(problem.rig.without((*log.unresolved, *log.unreached)), runs)
         whole.weigh_like(problem)
-        found = descend_progressively(whole, whole.place(problem.values_at(found.x)), log, horizon=math.inf)
-        problem, found = whole, settle_weights(whole, found)
-    found = other_valleys(problem, found, log, attempts=ATTEMPTS if near is None else FEW)
-    if found.interrupted:  # perhaps over a part of the runs
-        found = replace(found, normal=problem.normal(found.x))
-    return problem, found
+        end = descend_progressively(whole, whole.place(problem.values_at(end.x)), log, horizon=math.inf)
+        problem, end = whole, settle_weights(whole, end)
+    end = other_valleys(problem, end, log, attempts=ATTEMPTS if near is None else FEW)
+    if end.interrupted:  # perhaps over a part of the runs
+        end = replace(end, normal=problem.normal(end.x))
+    return problem, end
 
 
 def _best_so_far(rig: GreyBox, runs: Sequence[Run], log: SearchLog) -> tuple[Problem, Array]:
@@ -205,7 +206,7 @@ def _check(rig: GreyBox, runs: Sequence[Run], method: str) -> None:
     if not runs:
         raise BadInput("an identification needs at least one run with role 'fit', none came; set it for one run.")
     if not rig.estimated:
-        raise BadInput("nothing is asked: no parameter is to be estimated; give at least one a guess.")
+        raise BadInput("no parameter is to be estimated; give at least one a guess.")
     for run in runs:
         if run.t.size < 10:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")
@@ -230,31 +231,31 @@ def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
 
 
 def _conclude(
-    asked: GreyBox, runs: Sequence[Run], problem: Problem, found: Descent, log: SearchLog, *, watch: bool
+    requested: GreyBox, runs: Sequence[Run], problem: Problem, end: Descent, log: SearchLog, *, watch: bool
 ) -> Fit:  # fmt: skip
     """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions.
 
     Where the motion runs away nothing is known of how sure the numbers are, and nothing is predicted.
     """
-    best = assess(problem, found.x)
-    seen = identifiability(best)
+    best = assess(problem, end.x)
+    identifiable = identifiability(best)
     warnings = list(log.warnings)
-    brief = found.interrupted or bool(best.lost)
-    little = explains_little(problem, found)
+    brief = end.interrupted or bool(best.lost)
+    little = explains_little(problem, end)
     if little and not brief:
         warnings.append(
             "The search stopped after its first pass, because the model explains less than two thirds of how the "
             "signals vary; intervals come from standard errors. Look at units, signs and the plant first."
         )
-    estimates = shared_estimates(best, seen.hidden, log, profiles=not (brief or little))
+    estimates = shared_estimates(best, identifiable.hidden, log, profiles=not (brief or little))
     per_run, groups = run_estimates(best)
     for name, value in log.rivals.items():
         e = widened(estimates[name], (value, value))
-        estimates[name] = replace(e, status="weak" if e.status == "firm" else e.status)
-    left_out = [n for n in asked.estimated if n not in problem.rig.estimated]
+        estimates[name] = replace(e, status="poorly determined" if e.status == "well determined" else e.status)
+    left_out = [n for n in requested.estimated if n not in problem.rig.estimated]
     for name in left_out:
-        unit = asked.parameters[name].unit
-        value = neutral(asked.plant, name)
+        unit = requested.parameters[name].unit
+        value = neutral(requested.plant, name)
         estimates[name] = Estimate(value=value, stderr=0.0, interval=(value, value), unit=unit, status="left out")
         warnings.append(
             f"{name} was left out: no fitted run reaches it, so a run that goes further may be limited where this "
@@ -264,22 +265,23 @@ def _conclude(
             if name in log.unresolved
             else f"{name} was left out: with it the held-out part of the runs is not predicted better."
         )
-    estimates = {n: estimates[n] for n in asked.parameters if n in estimates}
+    estimates = {n: estimates[n] for n in requested.parameters if n in estimates}
     if not brief:
-        estimates = with_model_uncertainty(estimates, best, asked, left_out, log)
+        estimates = with_model_uncertainty(estimates, best, requested, left_out, log)
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
     ahead = None if best.lost else judged(problem, best.x)
     scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
-    skipped = _skipped(runs, watch=watch) if found.interrupted else ()
+    skipped = _skipped(runs, watch=watch) if end.interrupted else ()
     if skipped:
         warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
     elif len(scored) < len(runs):
         warnings.append("What was held out is not predicted, because the fit failed.")
-    unseen = () if best.lost else seen.sentences({n: p.unit for n, p in asked.parameters.items()})
+    unseen = () if best.lost else identifiable.sentences({n: p.unit for n, p in requested.parameters.items()})
     conventions = tuple(log.conventions()) if least_explained(scores) < GOOD else ()
     assumed = assumptions(best, estimates, evaluate=not brief)
-    estimates = with_assumptions(estimates, assumed)
+    tied = () if brief else ties(best, estimates)
+    estimates = with_assumptions(with_ties(estimates, tied), assumed)
     late = None if brief or little or conventions else lateness(best)
     warnings += [late.sentence] if late else []
     answers = judge(
@@ -290,20 +292,21 @@ def _conclude(
             unseen=unseen,
             conventions=conventions,
             assumptions=assumed,
-            converged=found.converged,
-            interrupted=found.interrupted,
+            converged=end.converged,
+            interrupted=end.interrupted,
             memory=best.memory,
             bent=late.bent if late else (),
             period=min(t.period for t in problem.tracks),
-            standing=None if brief or seen.hidden else standing(best),
+            standing=None if brief or identifiable.hidden else standing(best),
             judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
+            ties=tied,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
         )
     )
     return Fit(
-        model=asked,
+        model=requested,
         estimates=estimates,
         per_run=per_run,
         groups=groups,
@@ -314,17 +317,17 @@ def _conclude(
         method="",
         evaluations=problem.evaluations,
         seconds=0.0,
-        cost=found.normal.cost,
-        names=seen.names,
-        correlation=_correlation(best, seen),
-        singular_values=seen.singular_values,
-        directions=seen.directions,
+        cost=end.normal.cost,
+        names=identifiable.names,
+        correlation=_correlation(best, identifiable),
+        singular_values=identifiable.singular_values,
+        directions=identifiable.directions,
         unseen=unseen,
         warnings=(*warnings, *conventions),
         history=tuple(log.history),
-        interrupted=found.interrupted,
+        interrupted=end.interrupted,
         not_evaluated=skipped,
-        poles={} if seen.hidden else _poles(best),  # a pole may depend on what the data cannot see
+        poles={} if identifiable.hidden else _poles(best),  # a pole may depend on what the data cannot see
         assumptions=assumed,
         bands=bands,
         failed=bool(best.lost),
@@ -339,20 +342,20 @@ def _scores(
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    found = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
+    scores = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     foreseen = [r for r in runs if r.role != "fit"]
     pace = min(t.period for t in problem.tracks)
-    for label, told in predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress).items():
-        asked = next(run for run in foreseen if run.label == label)
-        found[label] = replace(told, black_box=black_box(fitted, asked, pace))
-    return {run.label: found[run.label] for run in runs}
+    for label, predicted in predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress).items():
+        held_out = next(run for run in foreseen if run.label == label)
+        scores[label] = replace(predicted, black_box=black_box(fitted, held_out, pace))
+    return {run.label: scores[run.label] for run in runs}
 
 
-def _correlation(best: Optimum, seen: Identifiability) -> Array:
-    """Correlation (names, names) of the shared numbers in the order of `seen.names`."""
-    places = [i for i in best.shared if best.problem.unknowns[i].name in seen.names]
+def _correlation(best: Optimum, identifiable: Identifiability) -> Array:
+    """Correlation (names, names) of the shared numbers in the order of `identifiable.names`."""
+    places = [i for i in best.shared if best.problem.unknowns[i].name in identifiable.names]
     if best.lost:
         return np.eye(len(places))
     C = best.covariance[np.ix_(places, places)]

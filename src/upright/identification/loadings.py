@@ -32,7 +32,7 @@ MOST = 20_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loaded:
-    """One free swing with a known inertia added [kg or kg m^2]; `command` is what the drive was told meanwhile."""
+    """One free swing with a known inertia added [kg or kg m^2]; `command` is the drive's meanwhile."""
 
     label: str
     added: float
@@ -78,7 +78,7 @@ def swings(
     command : str
         Column of the command: piecewise constant.
     resolution : float, optional
-        Smallest step of the sensor, told from the column when omitted.
+        Smallest step of the sensor, from the column when omitted.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def swings(
                 f"'{label}': the command '{command}' changes {len(cuts) - 2} times, and a step response needs steps;"
                 " name the column that holds the steps."
             )
-    found: list[Loaded] = []
+    loaded: list[Loaded] = []
     reason = ""
     for i, (first, last) in enumerate(pairwise(cuts)):
         part = slice(first, last)
@@ -109,11 +109,11 @@ def swings(
             reason = str(error)
             continue
         name = label if len(cuts) == 2 else f"{label}, step {i}"
-        told = float(record[command][first]) if command else 0.0
-        found.append(Loaded(label=name, added=added, decay=swing, command=told))
-    if not found:
+        command_before = float(record[command][first]) if command else 0.0
+        loaded.append(Loaded(label=name, added=added, decay=swing, command=command_before))
+    if not loaded:
         raise NotIdentifiable(f"'{label}': {reason or 'nothing moves in this log; name the column of the position.'}")
-    return tuple(found)
+    return tuple(loaded)
 
 
 def fit_loadings(loaded: Sequence[Loaded], *, tolerance: float = 0.0, piece: float = 0.0) -> Loadings:
@@ -215,7 +215,9 @@ def _damping(loaded: Sequence[Loaded], k: Estimate) -> Estimate:
 
 def _verdict(levels: int, dof: int, chi: float, k: Estimate, bare: Estimate) -> str:
     if bare.interval[0] <= 0:
-        return "The bare body's inertia cannot be told from nothing: its interval reaches zero. Add less, or repeat."
+        return (
+            "The bare body's inertia cannot be distinguished from zero: its interval reaches zero. Add less, or repeat."
+        )
     if levels == 2:
         return "Two loadings fix a line but cannot show that it is one; a third would."
     from scipy.stats import chi2
@@ -296,16 +298,16 @@ def plan_loadings(
         raise BadInput("A plan needs a positive bare inertia and a positive error of one frequency, such as 0.2 %.")
     if tolerance > 0 and piece <= 0:
         raise BadInput("A tolerance of the pieces needs the inertia of one piece.")
-    found: list[Plan] = []
+    plans: list[Plan] = []
     for used, shares in _designs(len(differing), runs, levels):
         loadings = tuple(differing[i] for i in used)
         k, m, both = _promise(np.array([w.added for w in loadings]), shares, bare, error, tolerance, piece)
         for i in dict.fromkeys((int(np.argmin(k)), int(np.argmin(both)))):
-            found.append(
+            plans.append(
                 Plan(loadings=loadings, runs=tuple(shares[i].tolist()), k=float(k[i]), bare=float(m[i]),
                      both=float(both[i]))
             )  # fmt: skip
-    return min(found, key=lambda plan: plan.k), min(found, key=lambda plan: plan.both)
+    return min(plans, key=lambda plan: plan.k), min(plans, key=lambda plan: plan.both)
 
 
 def _designs(size: int, runs: int, levels: int) -> Generator[tuple[tuple[int, ...], NDArray[np.int64]]]:

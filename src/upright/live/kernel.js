@@ -14,8 +14,7 @@ class Kernel {
       __stack_pointer: new WebAssembly.Global({ value: "i32", mutable: true }, start),
     };
     for (const name of described.imports) env[name] = Math[name];
-    const code = Uint8Array.from(atob(described.wasm), (c) => c.charCodeAt(0));
-    this.module = new WebAssembly.Instance(new WebAssembly.Module(code), { env });
+    this.module = new WebAssembly.Instance(new WebAssembly.Module(Kernel.bytes(described.wasm)), { env });
     this.words = [];
     this.place = {};
     this.arrays = {};
@@ -28,10 +27,11 @@ class Kernel {
       }
       const count = bytes(a) / 8;
       const view = a.whole ? new BigInt64Array(memory.buffer, top, count) : new Float64Array(memory.buffer, top, count);
-      if (a.data) {
-        const raw = Uint8Array.from(atob(a.data), (c) => c.charCodeAt(0));
-        new Uint8Array(memory.buffer, top, raw.length).set(raw);
-      }
+      const wide = count / (a.rows?.length || 1);
+      a.rows?.forEach((row, i) => {
+        if (typeof row !== "string") view.fill(a.whole ? BigInt(row) : row, i * wide, (i + 1) * wide);
+        else new Uint8Array(memory.buffer, top + 8 * i * wide, 8 * wide).set(Kernel.bytes(row));
+      });
       this.arrays[a.name] = view;
       this.words.push(top, ...a.shape);
       top = (top + bytes(a) + 63) & ~63;
@@ -39,9 +39,16 @@ class Kernel {
     this.steps = this.words[this.place._nsteps];
   }
 
-  // The whole motion that the arrays say.
-  run() {
+  static bytes(text) {
+    return Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  }
+
+  // The whole motion that the arrays say, of some of its blocks.
+  run(first = 0, after = this.words[this.place._b1]) {
+    const all = this.words[this.place._b1];
+    [this.words[this.place._b0], this.words[this.place._b1]] = [first, after];
     this._call(0, this.steps + 1, this.steps);
+    [this.words[this.place._b0], this.words[this.place._b1]] = [0, all];
   }
 
   // The motion from sample `first` until the state of sample `end` stands in W; above 0 it goes on from the last call.

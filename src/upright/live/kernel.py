@@ -42,15 +42,25 @@ def described(simulator: Simulator, call: Call, *, width: int) -> dict[str, Any]
         if not isinstance(value, np.ndarray):
             arguments.append({"name": name, "value": value})
             continue
-        whole = value.dtype == np.int64
-        argument: dict[str, Any] = {"name": name, "shape": list(value.shape)} | ({"whole": True} if whole else {})
+        argument: dict[str, Any] = {"name": name, "shape": list(value.shape)}
+        if value.dtype == np.int64:
+            argument["whole"] = True
         if name not in _WRITTEN and value.any():
-            argument["data"] = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode()
+            argument["rows"] = [_row(row) for row in value.reshape(-1, value.shape[-1] if value.ndim > 1 else 1)]
         arguments.append(argument)
     return {
         "wasm": base64.b64encode(made.code).decode(),
         "imports": list(made.imports),
         "width": width,
         "rows": dict(simulator.rows),
+        "settings": list(simulator.settings),
+        "parameters": [*simulator.names, *simulator.law_rows],
         "arguments": arguments,
     }
+
+
+def _row(row: np.ndarray) -> int | float | str:
+    """A row of an array: one number where all are alike and JSON has it, else their bytes in base64."""
+    if (row == row[0]).all() and np.isfinite(row[0]):
+        return row[0].item()
+    return base64.b64encode(np.ascontiguousarray(row).tobytes()).decode()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from upright.physics.outline import Outline, beyond, tip
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
@@ -48,6 +49,12 @@ def _two_links(p: Any, theta: Any, theta_dot: Any, second: Any, second_dot: Any)
     return T, V
 
 
+def _two_lines(p: Any, theta: Any, second: Any) -> Outline:
+    """Two links at absolute angles, the second one uniform."""
+    elbow = tip(p.l_1, theta)
+    return [("theta_1", [(0, 0, 0), elbow]), ("theta_2", [elbow, beyond(elbow, tip(2 * p.l_c2, second))])]
+
+
 class DoublePendulum(TwoLinks):
     """Two rigid links in a vertical plane, the second angle counted from the first link; a Pendubot when driven."""
 
@@ -68,6 +75,11 @@ class DoublePendulum(TwoLinks):
         """Two links; the second turns with the first."""
         T, V = _two_links(p, q[0], v[0], q[0] + q[1], v[0] + v[1])
         return T, V, (p.b_1 * v[0] ** 2 + p.b_2 * v[1] ** 2) / 2
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """The second angle is counted from the first link."""
+        return _two_lines(p, q[0], q[0] + q[1])
 
 
 class DoublePendulumAbsolute(TwoLinks):
@@ -90,6 +102,11 @@ class DoublePendulumAbsolute(TwoLinks):
         """Two links; the second joint turns by the difference of the angles."""
         T, V = _two_links(p, q[0], v[0], q[1], v[1])
         return T, V, (p.b_1 * v[0] ** 2 + p.b_2 * (v[1] - v[0]) ** 2) / 2
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """Both angles are counted from hanging."""
+        return _two_lines(p, q[0], q[1])
 
 
 class FlexibleLink(Plant):
@@ -116,3 +133,12 @@ class FlexibleLink(Plant):
         """Hub, and the link that turns with it and bends."""
         T = (p.J_h * v[0] ** 2 + p.J_l * (v[0] + v[1]) ** 2) / 2
         return T, p.k_s * q[1] ** 2 / 2, (p.b_1 * v[0] ** 2 + p.b_2 * v[1] ** 2) / 2
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """The link from above, its first half as the hub turns, the other as it bends; lengths are for the eye."""
+        from sympy import cos, sin
+
+        middle = (0.15 * cos(q[0]), 0.15 * sin(q[0]), 0)
+        end = (middle[0] + 0.15 * cos(q[0] + q[1]), middle[1] + 0.15 * sin(q[0] + q[1]), 0)
+        return [("theta", [(0, 0, 0), middle]), ("alpha", [middle, end])]

@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from upright.errors import BadInput, ImpossiblePhysics
+from upright.physics.outline import Outline, box, circle
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
@@ -95,7 +96,23 @@ def _chain(bodies: int, kind: str) -> type[Plant]:
         D_links = sum(getattr(p, f"c_{name}") * (v[j] - v[i]) ** 2 / 2 for i, j, name in links)
         return T, V + V_links, D + D_links
 
+    def outline(p: Any, q: Any) -> Outline:
+        """Carts on a rail, or disks on a vertical shaft with a spoke each; distances are for the eye."""
+        last = bodies - 1
+        if kind == "rectilinear":
+            rail = [(-0.1, 0, -0.03), (0.25 * last + 0.1, 0, -0.03)]
+            return [("", rail), *((f"{x}_{i}", box(0.25 * (i - 1) + q[i - 1], 0.12, 0.06)) for i in indices)]
+        from sympy import cos, sin
+
+        lines: Outline = [("", [(0, 0, -0.12), (0, 0, 0.12 * last + 0.06)])]
+        for i in indices:
+            z = 0.12 * (i - 1)
+            spoke = [(0, 0, z), (0.1 * cos(q[i - 1]), 0.1 * sin(q[i - 1]), z)]
+            lines += [("", circle(0.1, z)), (f"{x}_{i}", spoke)]
+        return lines
+
     members |= {
+        "outline": staticmethod(outline),
         "__doc__": f"Chain of {bodies} {inertia}(s), {effort} on body 1.",
         "coordinates": tuple(Coordinate(f"{x}_{i}", position_unit, f"{place} {i}") for i in indices),
         "inputs": (Input(u, force_unit, f"{effort} on body 1", on=f"{x}_1"),),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from upright.physics.outline import Outline, beyond, box, circle, tip
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
@@ -42,6 +43,11 @@ class Pendulum(Plant):
         T = (p.J_p + p.m_p * p.l_cg**2) * v[0] ** 2 / 2
         V = -p.m_p * p.g * p.l_cg * cos(q[0])
         return T, V, p.b_2 * v[0] ** 2 / 2
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """A uniform rod: its centre of gravity is half way."""
+        return [("theta", [(0, 0, 0), tip(2 * p.l_cg, q[0])])]
 
 
 class CartPendulum(Plant):
@@ -88,6 +94,13 @@ class CartPendulum(Plant):
         T = (p.m_c * x_dot**2 + p.m_p * (horizontal**2 + vertical**2) + p.J_p * theta_dot**2) / 2
         V = -p.m_p * p.g * p.l_cg * cos(theta) + p.k_x * x**2 / 2
         return T, V, (p.b_1 * x_dot**2 + p.b_2 * theta_dot**2) / 2
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """Rail, cart, uniform rod."""
+        (x, theta), size = q, p.l_cg
+        rod = [(x, 0, 0), beyond((x, 0, 0), tip(2 * size, theta))]
+        return [("", [(-4 * size, 0, 0), (4 * size, 0, 0)]), ("x", box(x, size / 1.5, size / 3)), ("theta", rod)]
 
 
 class Furuta(Plant):
@@ -146,3 +159,15 @@ class Furuta(Plant):
         upright = sqrt(1 - p.tilt_x**2 - p.tilt_y**2)
         V = p.m_p * p.g * (upright * z - p.tilt_x * x - p.tilt_y * y) + p.k_psi * psi**2 / 2
         return T, V, (p.b_1 * psi_dot**2 + p.b_2 * theta_dot**2) / 2
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """Column, way of the arm, arm, uniform rod at right angles to it."""
+        from sympy import cos, sin
+
+        psi, theta = q
+        x, y = p.r * cos(psi), p.r * sin(psi)
+        across, _, down = tip(2 * p.l_cg, theta)
+        rod = [(x, y, 0), (x + across * sin(psi), y - across * cos(psi), down)]
+        column = [(0, 0, -2.4 * p.l_cg), (0, 0, 0)]
+        return [("", column), ("", circle(p.r, 0.0)), ("psi", [(0, 0, 0), (x, y, 0)]), ("theta", rod)]

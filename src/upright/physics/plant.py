@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
 from upright.physics.equations import Derived, chooses, evaluated, mass_and_force, small_motions
+from upright.physics.outline import Outline
 from upright.physics.statement import Statement
 from upright.physics.stored import stored
 from upright.shown import Shown
@@ -138,6 +139,14 @@ class Plant(Shown, Statement, abstract=True):
         """Lines of a moving drawing seen from the side, each of shape (moments, 2, points).
 
         `q` has coordinates by name, shape (moments,). Without lines it is drawn by what its coordinates are called.
+        """
+        return []
+
+    @staticmethod
+    def outline(p: Any, q: Any) -> Outline:
+        """Lines of the rig in space [m], z up: each with the coordinate that moves it, empty for what stands.
+
+        Points are expressions in the coordinates, as in `energies`. A plant without an outline is not drawn alive.
         """
         return []
 

@@ -129,16 +129,16 @@ def _rating(cell: str, scale: tuple[int, int], where: str) -> float:
         value = float(cell)
     except ValueError:
         raise BadInput(f"{where}: a rating from {low} to {high} was needed, got '{cell[:40]}'.") from None
-    if not low <= value <= high or value != round(value):
+    if not low <= value <= high:
         raise BadInput(
-            f"{where}: a whole rating from {low} to {high} was needed, got {cell}; correct it, leave it empty, or say"
+            f"{where}: a rating from {low} to {high} was needed, got {cell}; correct it, leave it empty, or give"
             " --scale."
         )
     return value
 
 
 def _pairs(header: Sequence[str], words: Sequence[set[str]]) -> dict[str, tuple[int, int]]:
-    """Columns before and after by name of what was asked."""
+    """Columns before and after by name of the question."""
     pairs: dict[str, dict[str, int]] = {}
     for i, (heading, w) in enumerate(zip(header, words, strict=True)):
         if not w & (_BEFORE | _AFTER):

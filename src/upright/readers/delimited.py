@@ -15,7 +15,7 @@ from upright.readers.reader import READERS, Reader
 from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuild
 from upright.readers.source import Source, TextTable
 from upright.records import Array, Record
-from upright.records.columns import stated_unit, time_scale
+from upright.records.columns import stated_time_unit, stated_unit, time_scale
 from upright.records.record import CSV_MARK
 from upright.units import converted
 
@@ -96,7 +96,7 @@ def read(source: Source) -> Record:
     notes: list[str] = []
     if not text.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
-    elif not time_scale(text.names[at]):
+    elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
         notes.append(f"No column is named like a time; '{text.names[at]}' is the first and increases.")
     t = converted(table[:, at], seconds)
     if is_epoch(t) and seconds == 1:
@@ -189,7 +189,7 @@ def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
             " name the time column or put it first",
             line=max(text.first_line - 1, 1),
         )
-    return 0, 1.0
+    return 0, (stated_time_unit(text.names[0]) if text.named else 0.0) or 1.0
 
 
 def _torn(text: TextTable, rows: int) -> str:

@@ -1,4 +1,4 @@
-"""Time base and columns of a log, as far as they can be told before any model: are its times true, what is each?
+"""Time base and columns of a log, before any model: are its times true, what is each?
 
 Some columns are not what their name says. Each test of that answers a sentence, or nothing. They come from logs of
 real rigs: a "Control Effort" that holds the reference, a "Commanded Pos" that follows the encoder, a "velocity" that
@@ -27,9 +27,11 @@ _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
 _LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement)\d*$", re.IGNORECASE)
 _PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|mm)", re.IGNORECASE)
 _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
-_EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?\d?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
+_EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?(?i:\d|m|motor)?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
+EFFORTS = ("V", "A", "N", "N m")
 _DRIVE = re.compile(
-    r"^(u|v|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref", re.IGNORECASE
+    r"^([uv]_?m?|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref",
+    re.IGNORECASE,
 )
 
 
@@ -213,7 +215,7 @@ def effort_unit(name: str) -> str:
     match = _EFFORT.fullmatch(name)
     unit = (match[1] or match[2]).replace("Nm", "N m") if match else ""
     known = unit and units.known(unit)
-    return unit if known and any(units.same_dimension(unit, effort) for effort in ("V", "A", "N", "N m")) else ""
+    return unit if known and any(units.same_dimension(unit, effort) for effort in EFFORTS) else ""
 
 
 def _is_drive(name: str, values: Array, unit: str) -> bool:
@@ -221,6 +223,8 @@ def _is_drive(name: str, values: Array, unit: str) -> bool:
     if _DRIVE.search(name) or effort_unit(name):
         return True
     changes = int(np.count_nonzero(np.diff(values)))
+    if any(units.same_dimension(unit, effort) for effort in EFFORTS) and unit not in ("", "1"):
+        return 0 < changes <= 0.1 * values.size  # a potentiometer's volts change with every sample
     levels = np.unique(values).size
     return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.1 * values.size
 

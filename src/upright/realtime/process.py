@@ -12,13 +12,13 @@ import os
 import pickle
 import sys
 import traceback
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import of_values
+from upright.realtime.interrupts import no_interrupt
 from upright.realtime.pace import Pace, Virtual, WallClock
 from upright.realtime.priority import step_forward
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
@@ -91,32 +91,34 @@ def run_in_process(
         raise BadInput(f"this run cannot be sent to a process of its own ({error}); run it inline.") from None
     memory = context.RawArray("d", _FIELDS + 1 + _READINGS)
     phase = context.RawArray("c", 201)
-    wish = context.RawValue("b", 0)
+    stop = context.RawValue("b", 0)
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(
-        target=_child, args=(os.getpid(), order, memory, phase, wish, theirs, paced), name="upright loop"
+        target=_child, args=(os.getpid(), order, memory, phase, stop, theirs, paced), name="upright loop"
     )
-    with _no_interrupt_for_the_child():
+    with no_interrupt():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
         child.start()
     theirs.close()
     window = _Window(memory, phase)
     answer: Any = None
     try:
         while not wait([ours, child.sentinel], _POLL):
-            _ask(wish, watch, window)
+            _ask(stop, watch, window)
         answer = ours.recv() if ours.poll(1.0) else None
     except EOFError:
         answer = None
     except KeyboardInterrupt:
-        wish.value = 1
-        answer = ours.recv() if ours.poll(10.0) else None
+        with no_interrupt():  # a second one must not lose the verdict
+            stop.value = 1
+            answer = _last(ours)
     finally:
-        wish.value = 1
-        child.join(10.0)
-        if child.is_alive():
-            child.kill()
-            child.join()
-        ours.close()
+        with no_interrupt():
+            stop.value = 1
+            child.join(10.0)
+            if child.is_alive():
+                child.kill()
+                child.join()
+            ours.close()
     if isinstance(answer, UprightError):
         raise answer
     if isinstance(answer, RunEnd):
@@ -132,29 +134,21 @@ def run_in_process(
     )  # fmt: skip
 
 
-def _ask(wish: Any, watch: Callable[[RunState], str], window: _Window) -> None:
-    if watch(window.get()):
-        wish.value = 1
-
-
-@contextmanager
-def _no_interrupt_for_the_child() -> Generator[None]:
-    """Ctrl-C reaches a whole group of processes; the child is to be asked by its flag, and starts deaf to it."""
-    import signal
-    import threading
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _last(pipe: Connection) -> Any:
+    """The child's answer once it was told to stop; None when it dies without one."""
     try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
+        return pipe.recv() if pipe.poll(10.0) else None
+    except EOFError:
+        return None
+
+
+def _ask(stop: Any, watch: Callable[[RunState], str], window: _Window) -> None:
+    if watch(window.get()):
+        stop.value = 1
 
 
 def _child(
-    parent: int, order: RunOrder, memory: Any, phase: Any, wish: Any, pipe: Connection, paced: bool
+    parent: int, order: RunOrder, memory: Any, phase: Any, stop: Any, pipe: Connection, paced: bool
 ) -> None:  # fmt: skip
     import signal
 
@@ -166,7 +160,7 @@ def _child(
         return  # before anything is opened
 
     def stopped() -> str:
-        if wish.value:
+        if stop.value:
             return BY_HAND
         return "The program that started the loop is gone." if orphan() else ""
 

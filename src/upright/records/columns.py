@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -11,7 +12,14 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.units import converted
 
-TIME_NAMES = ("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec")
+TIME_NAMES = (
+    *("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec"),
+    *("zeit", "temps", "tiempo", "tempo", "tid", "tijd", "czas"),
+)
+ANGLES = {"rad": 1.0, "deg": math.pi / 180, "rev": 2 * math.pi}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""SI value of the units in which logs hold places."""
+_SPELLED = {"\u00b0": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "count": "counts"}
 _LONGEST = 200  # characters of a name that is looked into
 # the names are case-folded, which makes the micro sign a Greek letter
 _UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9}
@@ -20,14 +28,21 @@ _UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "\
 def time_scale(name: str) -> float:
     """Seconds per unit of a column that is called like a time; 0 when it is not.
 
-    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"`` and ``"t_us"`` are.
+    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"``, ``"t_us"`` and ``"ms"`` are.
     """
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name[:_LONGEST].casefold())
     stem, unit = (match[1], match[2] or "") if match else ("", "")
     if stem in TIME_NAMES:
         return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
+    if not unit and len(stem) > 1 and stem in _UNIT_SUFFIX:  # "s" may be a position
+        return _UNIT_SUFFIX[stem]
     head, _, suffix = stem.rpartition("_")
     return _UNIT_SUFFIX.get(suffix, 0.0) if head in TIME_NAMES else 0.0
+
+
+def stated_time_unit(name: str) -> float:
+    """Seconds per unit of a column that states a unit of time, whatever it is called; 0 where it states none."""
+    return _UNIT_SUFFIX.get(stated_unit(name).casefold(), 0.0)
 
 
 def stated_unit(name: str) -> str:
@@ -37,7 +52,8 @@ def stated_unit(name: str) -> str:
         return ""
     from upright.units import known
 
-    return match[1] if known(match[1]) else ""
+    unit = _SPELLED.get(match[1].casefold(), match[1])
+    return unit if known(unit) else ""
 
 
 def bare_name(name: str) -> str:

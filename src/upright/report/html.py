@@ -30,19 +30,25 @@ def fragment(page: Chapter) -> str:
     )  # fmt: skip
 
 
-def _rendered(template: str, **values: Any) -> str:
+def rendered(package: str, template: str, **values: Any) -> str:
+    """A template of a package with its values, texts escaped but for `markupsafe.Markup`."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    templates = Environment(
+        loader=PackageLoader(package, "templates"), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return templates.get_template(template).render(**values)
+
+
+def _rendered(template: str, **values: Any) -> str:
     from markupsafe import Markup
 
     def drawing(picture: Picture, prefix: str) -> Markup:
         """Mark-up of a picture, with ids that no other chapter of the page has."""
         return Markup(_ID.sub(rf"\g<1>{prefix}", picture.svg))
 
-    templates = Environment(
-        loader=PackageLoader("upright.report"), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    return templates.get_template(template).render(**values, drawing=drawing, kind=lambda block: type(block).__name__)
+    return rendered("upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__)
 
 
 def write_html(path: Path, page: Chapter | Book) -> Path:

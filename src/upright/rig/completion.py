@@ -16,7 +16,7 @@ from upright.rig.rig import Rig
 
 
 def completed(
-    rig: Rig, given: Mapping[str, Entry | None] | None = None, *, vendor: str = "",
+    rig: Rig, entries: Mapping[str, Entry | None] | None = None, *, vendor: str = "",
     needs: Collection[str] = ("limit", "servo_period", "counts"), who: str = "a simulation", form: str = "--{} {}",
 ) -> Rig:  # fmt: skip
     """A rig with what is known of its drive, encoders and servo: what a call gives, its own, the data sheet named.
@@ -27,7 +27,7 @@ def completed(
     Parameters
     ----------
     rig : Rig
-    given : mapping of str to Entry, optional
+    entries : mapping of str to Entry, optional
         Options of the command line; None is none.
     vendor : str, optional
         Data sheet chosen by name; the rig's own choice when empty.
@@ -44,21 +44,21 @@ def completed(
         When something is missing, with the options and keys that say it.
     """
     chosen = check_vendor(vendor or rig.hardware.vendor)
-    said = replace(rig.hardware, vendor=chosen).given(given or {})
+    hardware = replace(rig.hardware, vendor=chosen).with_entries(entries or {})
     if chosen:
-        said = said.over(sheet(chosen, rig.plant, rig.unit))
+        hardware = hardware.over(sheet(chosen, rig.plant, rig.unit))
     counts = {f"counts.{c.name}": form.format("counts", 4096) for c in rig.plant.coordinates}
     options = {"limit": "10", "servo_period": '"2 ms"', "travel": "0.2"}
     options = {n: form.format(n.removeprefix("servo_"), value) for n, value in options.items()}
     wanted = {n: w for n, w in options.items() if n in needs} | (counts if "counts" in needs else {})
-    said.demand(wanted, who, sheet=form.format("vendor", "NAME") or 'vendor = "NAME" in RIG.toml')
-    if "delay" not in said.entries and "servo_period" in said.entries:
-        late = Entry(value=said.entries["servo_period"].value, unit="s", source="assumed: one servo period")
-        said = said.given({"delay": late})
+    hardware.demand(wanted, who, sheet=form.format("vendor", "NAME") or 'vendor = "NAME" in RIG.toml')
+    if "delay" not in hardware.entries and "servo_period" in hardware.entries:
+        late = Entry(value=hardware.entries["servo_period"].value, unit="s", source="assumed: one servo period")
+        hardware = hardware.with_entries({"delay": late})
     make = make_of_vendor(chosen, rig.plant)
     return replace(
-        rig, hardware=said, name=make.name if make else said.name or rig.name, plant=_with_friction(rig.plant, make),
-        unit=rig.unit or "V",
+        rig, hardware=hardware, name=make.rig.name if make else hardware.name or rig.name,
+        plant=_with_friction(rig.plant, make), unit=rig.unit or "V",
     )  # fmt: skip
 
 
@@ -75,8 +75,8 @@ def twin_of(rig: Rig, seed: int) -> Rig:
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     if make is not None:
         truth = make_rig(make.key, seed)
-        said = {n: e for n, e in rig.hardware.entries.items() if e.source.startswith("--")}
-        return replace(truth, hardware=replace(truth.hardware, entries={**truth.hardware.entries, **said}))
+        typed = {n: e for n, e in rig.hardware.entries.items() if e.source.startswith("--")}
+        return replace(truth, hardware=replace(truth.hardware, entries={**truth.hardware.entries, **typed}))
     if not rig.draws:
         raise BadInput(
             "a rig to run on is drawn from the fit's covariance, and this fit has none; give no seed, or "
@@ -89,19 +89,19 @@ def twin_of(rig: Rig, seed: int) -> Rig:
 def doubts(known: Rig, run: Rig, truth: Rig | None = None) -> tuple[str, ...]:
     """What of a completed rig is somebody else's or assumed, and whether the one that runs is another."""
     out: list[str] = []
-    said = run.hardware
-    sheets = [n for n, e in said.entries.items() if e.source.startswith("data sheet")]
+    hardware = run.hardware
+    sheets = [n for n, e in hardware.entries.items() if e.source.startswith("data sheet")]
     if sheets:
-        out.append(f"From the data sheet of the {said.vendor}, not said of this rig: {_list(sheets)}.")
-    make = make_of_vendor(said.vendor, known.plant)
+        out.append(f"From the data sheet of the {hardware.vendor}, not specified for this rig: {_list(sheets)}.")
+    make = make_of_vendor(hardware.vendor, known.plant)
     if make is not None and run.plant != known.plant:
-        out.append(f"The fit knows no dry friction; simulations have that of the {make.name} as designed.")
-    assumed = [n for n, e in said.entries.items() if e.source.startswith("assumed")]
+        out.append(f"The fit knows no dry friction; simulations have that of the {make.rig.name} as designed.")
+    assumed = [n for n, e in hardware.entries.items() if e.source.startswith("assumed")]
     if assumed:
         out.append(f"Assumed, not measured: {_list(assumed)}.")
     ran = "" if truth is None else of_twin(truth.name, truth.seed).rig
-    if make is not None and truth is not None and said.name and said.name != ran:
-        out.append(f"The fit is of another rig ({said.name}) than the one that runs ({ran}).")
+    if make is not None and truth is not None and hardware.name and hardware.name != ran:
+        out.append(f"The fit is of another rig ({hardware.name}) than the one that runs ({ran}).")
     return tuple(out)
 
 
@@ -109,7 +109,7 @@ def _with_friction(plant: Plant, make: Make | None) -> Plant:
     dry = [n for n in ("b_1c", "b_2c") if n in plant.names()]
     if make is None or not dry or any(getattr(plant, n) for n in dry):
         return plant
-    return plant.replace(**{n: getattr(make.plant, n) for n in dry})
+    return plant.replace(**{n: getattr(make.rig.plant, n) for n in dry})
 
 
 def _list(names: Sequence[str]) -> str:

@@ -23,11 +23,11 @@ def driven(plant: Plant, drive: Mapping[str, float], at: str, *, side: float = 0
     """
     model = plant.linear(at, side=side)
     A, names = model.A, plant.state_names()
-    taken = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
-    if taken:
+    lost = sum(drive.get(f"actuator.{n}", 0.0) for n in ("slope", "damping", "standby"))
+    if lost:
         A = A.copy()
         for i, force in enumerate(plant.inputs):
-            A[:, names.index(force.on) + 1] -= taken * model.B[:, i]
+            A[:, names.index(force.on) + 1] -= lost * model.B[:, i]
     return replace(model, A=A, B=model.B * drive[GAIN])
 
 

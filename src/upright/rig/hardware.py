@@ -1,7 +1,7 @@
 """Drive, encoders, servo and travel of a rig, each number with its source.
 
 A study says it once, `fit.json` carries it, and every verb that simulates or designs takes it from there. A number that
-nobody gave is asked for, or taken from a vendor's data sheet that somebody chose by name; it is never filled in.
+is missing is requested, or taken from a vendor's data sheet chosen by name; it is never filled in.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Hardware:
         """The same with what it leaves out taken from `base`."""
         return replace(self, entries={**base, **self.entries})
 
-    def given(self, entries: Mapping[str, Entry | None]) -> Hardware:
+    def with_entries(self, entries: Mapping[str, Entry | None]) -> Hardware:
         """The same with entries put in the place of its own, such as options; None is no entry."""
         return replace(self, entries={**self.entries, **{n: e for n, e in entries.items() if e is not None}})
 
@@ -101,9 +101,11 @@ class Hardware:
         if not missing:
             return
         vendors = " or ".join(f'"{v}"' for v in VENDORS)
-        asked = "; ".join(f"{meaning_of(n)} ({' or '.join(w for w in (wanted[n], place_of(n)) if w)})" for n in missing)
+        missing_numbers = "; ".join(
+            f"{meaning_of(n)} ({' or '.join(w for w in (wanted[n], place_of(n)) if w)})" for n in missing
+        )
         raise BadInput(
-            f"{who} needs what neither the study nor its fit says: {asked}. "
+            f"{who} needs what neither the study nor its fit says: {missing_numbers}. "
             f"{'Give it as shown, or write it' if any(wanted.values()) else 'Write it'} into the study and identify "
             f"again; {sheet} takes a data sheet by name ({vendors}) where the rig is one of those."
         )

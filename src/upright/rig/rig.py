@@ -52,7 +52,7 @@ class Rig(Shown):
     draws : tuple of (Plant, float)
         Plants and gains drawn from a fit's covariance; empty without one.
     scales : tuple of float
-        What the encoders show over what is true; empty where the counts per unit are as said.
+        What the encoders show over what is true; empty where the counts per unit are right.
     mounting : Mounting, optional
         What else the encoders show: play and shafts off centre. Logs have both; a loop, which stays about one point,
         has the error and the slope that a shaft off centre has there.
@@ -141,29 +141,29 @@ class Rig(Shown):
             "limit": unit, "converter": unit, "offset": unit, "delay": "s", "lag": "s", "period": "s",
             "travel": place, "speed_limit": f"{place}/s", "twist": place,
         }  # fmt: skip
-        said: dict[str, Entry] = {}
+        entries: dict[str, Entry] = {}
         gone: set[str] = set()
-        for name in _ENTRIES.keys() & changes.keys():
+        for name in [n for n in _ENTRIES if n in changes]:
             value = in_unit(changes.pop(name), units[name])
             if name in ("limit", "period") and not 0 < value < math.inf:
                 raise BadInput(f"the {name} of a rig must be positive and finite, got {value:g}.")
             if math.isfinite(value):
-                said[_ENTRIES[name]] = Entry(value=value, unit=units[name], source="known")
+                entries[_ENTRIES[name]] = Entry(value=value, unit=units[name], source="known")
             else:
                 gone.add(_ENTRIES[name])
         if "more" in changes:
             more: Mapping[str, float] = changes.pop("more")
             gone |= {name.partition(".")[2] for name in self.more}
-            said |= {
+            entries |= {
                 name.partition(".")[2]: Entry(value=value, unit=ACTUATOR[name].unit, source="known")
                 for name, value in more.items()
             }
         if "counts" in changes:
-            said |= _counts(plant, changes.pop("counts"))
+            entries |= _counts(plant, changes.pop("counts"))
         hardware: Hardware = changes.pop("hardware", self.hardware)
-        if said or gone:
-            kept = {n: e for n, e in hardware.entries.items() if n not in gone}
-            hardware = replace(hardware, entries=kept | said)
+        if entries or gone:
+            remaining = {n: e for n, e in hardware.entries.items() if n not in gone}
+            hardware = replace(hardware, entries=remaining | entries)
         return replace(self, hardware=hardware, **changes)
 
     @property

@@ -2,7 +2,7 @@
 
 What a board can do by itself (read encoders, put a command out, switch its power stage) is a `Port`; everything that
 makes a `LiveRig` of it stands here once. At every tick the command is put out, a period passes, the encoders are read,
-and every limit is looked at before anybody is told; a limit that is passed puts the command to zero first.
+and every limit is checked before anything is reported; a limit that is passed puts the command to zero first.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ SENTENCES = {
 """Every fault as a clause."""
 
 
-def told(faults: Fault) -> str:
+def fault_text(faults: Fault) -> str:
     """Faults as a sentence has them."""
     return "; ".join(text for fault, text in SENTENCES.items() if fault in faults) or "no fault"
 
@@ -161,7 +161,7 @@ class Board:
             raise self._refusal("it has no limits; configure them first")
         self._must("arm", Mode.IDLE)
         if self._faults:
-            raise self._refusal(f"it is not cleared ({told(self._faults)})")
+            raise self._refusal(f"it is not cleared ({fault_text(self._faults)})")
         c, limits = self._there(), self._held()
         self._counts = self._before = self.port.read()
         for name, q, most in zip(c.coordinates, self._at(), limits.start, strict=True):
@@ -240,54 +240,54 @@ class Board:
         # half a period is what rounding of times cannot make
         if running and silent > self._held().watchdog + 0.5 * self._there().period:
             self._trip(Fault.WATCHDOG)
-        asked = 0.0
+        command = 0.0
         if self._mode == Mode.HOST:
-            asked = self._command
+            command = self._command
         elif self._mode == Mode.MCU and self._law is not None:
-            asked = self._law.step(self._at(), self._command)
-        self._pass(asked)
+            command = self._law.step(self._at(), self._command)
+        self._pass(command)
 
-    def _pass(self, asked: float) -> None:
+    def _pass(self, command: float) -> None:
         """Put a command out, let a period pass, read, and look at every limit."""
         c = self._there()
         if self._mode in (Mode.IDLE, Mode.FAULT):
             put = 0.0
-        elif not math.isfinite(asked):
+        elif not math.isfinite(command):
             self._trip(Fault.GAINS)
             put = 0.0
         else:
             most = self._held().command
-            put = min(max(math.floor(asked / c.step + 0.5) * c.step, -most), most)
+            put = min(max(math.floor(command / c.step + 0.5) * c.step, -most), most)
             self._full = self._full + c.period if abs(put) >= most else 0.0
         self.port.write(put)
         self._applied = put
         self._time = self.port.advance()
         self._before, self._counts = self._counts, self.port.read()
         self._tick += 1
-        if self._mode not in (Mode.IDLE, Mode.FAULT) and (found := self._beyond()):
-            self._trip(found)
+        if self._mode not in (Mode.IDLE, Mode.FAULT) and (faults := self._beyond()):
+            self._trip(faults)
 
     def _beyond(self) -> Fault:
         """Limits that the newest sample passes."""
-        c, limits, found = self._there(), self._held(), NO_FAULT
+        c, limits, faults = self._there(), self._held(), NO_FAULT
         at = self._at()
         steps = [(b - a) / per for a, b, per in zip(self._before, self._counts, c.counts, strict=True)]
         if any(abs(q) > most for q, most in zip(at, limits.travel, strict=True)):
-            found |= Fault.OVERTRAVEL
+            faults |= Fault.OVERTRAVEL
         if any(abs(s) > most * c.period * (1 + 1e-9) for s, most in zip(steps, limits.speed, strict=True)):
-            found |= Fault.OVERSPEED
+            faults |= Fault.OVERSPEED
         if len(at) > 1 and abs(at[0] - at[1]) > limits.twist:
-            found |= Fault.TWIST
+            faults |= Fault.TWIST
         if self._full > limits.saturation:
-            found |= Fault.SATURATION
+            faults |= Fault.SATURATION
         for i, step in enumerate(steps):
             for j in range(len(steps)):
                 self._still[j][i] += abs(step)  # how far i went since j showed its last count
             if step:
                 self._still[i] = [0.0] * len(steps)
         if limits.frozen and any(far > limits.frozen for row in self._still for far in row):
-            found |= Fault.ENCODER
-        return found
+            faults |= Fault.ENCODER
+        return faults
 
     def _trip(self, fault: Fault) -> None:
         self._off()
@@ -317,11 +317,13 @@ class Board:
         if self._mode not in modes:
             raise self._refusal(
                 f"to {what} it must be {' or '.join(m.name for m in modes)}, and it is {self._mode.name}"
-                + (f" ({told(self._faults)})" if self._faults else "")
+                + (f" ({fault_text(self._faults)})" if self._faults else "")
             )
 
     def _stopped(self) -> RigStopped:
-        return RigStopped(f"{self._there().name} stopped: {told(self._faults)}. Look at it before faults are cleared.")
+        return RigStopped(
+            f"{self._there().name} stopped: {fault_text(self._faults)}. Look at it before faults are cleared."
+        )
 
     def _refusal(self, why: str) -> RigStopped:
         return RigStopped(f"{self._there().name} refused: {why}.")

@@ -90,9 +90,9 @@ class RunningLaw:
         if reference is not None and row:
             row[0] = reference
         self.references = tuple(row)
-        given = readings if self._own else (*readings, *row)
+        inputs = readings if self._own else (*readings, *row)
         self.ticks += 1
-        return self._step((self.ticks - 1) * self.period if time is None else time, given)[0]
+        return self._step((self.ticks - 1) * self.period if time is None else time, inputs)[0]
 
 
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:

@@ -144,6 +144,15 @@ def open_line(path: str) -> Line:
     return TerminalLine(path) if sys.platform == "linux" else PySerialLine(path)
 
 
+def ports() -> dict[str, int]:
+    """Serial ports of this machine, each with its USB vendor's number, 0 without one."""
+    try:
+        from serial.tools.list_ports import comports
+    except ImportError:
+        raise BadInput("to look for a board, pyserial is needed: pip install 'upright[rig]'.") from None
+    return {port.device: port.vid or 0 for port in comports()}
+
+
 def _no_port(path: str, why: str | None) -> BadInput:
     return BadInput(
         f"the port {path} cannot be opened ({why}); is the board plugged in, and may you use it (group dialout)?"

@@ -11,7 +11,7 @@ from typing import NoReturn
 from upright.errors import BadInput, RigStopped
 from upright.laws import Law
 from upright.rigs import wire
-from upright.rigs.board import told
+from upright.rigs.board import fault_text
 from upright.rigs.driver import Connection, Driver
 from upright.rigs.line import Line, open_line
 from upright.rigs.onboard import onboard, ticks
@@ -143,9 +143,9 @@ class SerialRig:
         return self._about
 
     def _greet(self, every: int) -> wire.Hello:
-        """What the firmware says of itself when it is told how many ticks there are between two exchanges."""
-        asked = wire.greeting(every, nonce := self._nonce())
-        hello = self._hello = wire.hello(self._ask(Kind.HELLO, asked, max(_BOOT, self._patience)))
+        """Capabilities of the firmware, at this many ticks between two exchanges."""
+        greeting = wire.greeting(every, nonce := self._nonce())
+        hello = self._hello = wire.hello(self._ask(Kind.HELLO, greeting, max(_BOOT, self._patience)))
         if hello.protocol == wire.PROTOCOL and hello.nonce != nonce:
             raise RigStopped(f"{self._name()} answers another program; end that first.")
         self._tick = 1e-6 * hello.period
@@ -155,10 +155,10 @@ class SerialRig:
         """Hold limits, rounded towards the safe side to counts, steps and ticks, and to the ceilings that the board was
         compiled with; what came back is compared.
         """
-        asked = self._on_wire(limits)
-        held = self._ask(Kind.CONFIGURE, asked.body())
-        if not wire.limits(held).within(asked):
-            self._distrust("limits", wire.limits(held), asked)
+        requested = self._on_wire(limits)
+        held = self._ask(Kind.CONFIGURE, requested.body())
+        if not wire.limits(held).within(requested):
+            self._distrust("limits", wire.limits(held), requested)
         if self._resend is None and math.isfinite(self._again):
             self._again = min(_AGAIN, limits.watchdog / _TRIES)
         return self._from_wire(wire.limits(held))
@@ -288,14 +288,14 @@ class SerialRig:
             raise RigStopped("The rig is not open; open it first.")
         now = again = self._clock()
         patience = self._patience if patience is None else patience
-        given_up = now + patience
+        deadline = now + patience
         # An exchange that is repeated is a new one; anything else is done once, however often it is asked for.
         self._sequence = (self._sequence + 1) & 0xFF
-        while now < given_up:
+        while now < deadline:
             if now >= again:
                 line.write(wire.pack(kind, self._sequence, self._session, body))
                 again = now + (self._again if kind != Kind.LAW else max(self._again, _LOOKS_AT_A_LAW))
-            for frame in self._parser.feed(line.read(min(again, given_up) - now)):
+            for frame in self._parser.feed(line.read(min(again, deadline) - now)):
                 answer = self._answer(frame, kind)
                 if answer is not None:
                     return answer
@@ -326,7 +326,7 @@ class SerialRig:
         raise self._refusal(_WHY[self._status.result])
 
     def _on_wire(self, limits: Limits) -> wire.LimitsOnWire:
-        """Limits in the firmware's units, never wider than asked for."""
+        """Limits in the firmware's units, never wider than requested."""
         c, hello = self._there(), self._hello
         assert hello is not None
         n = len(c.coordinates)
@@ -403,16 +403,18 @@ class SerialRig:
             return self._about.name
         return f"The board on {self._line.name}" if self._line is not None else "The board"
 
-    def _distrust(self, what: str, held: object, asked: object) -> NoReturn:
+    def _distrust(self, what: str, held: object, requested: object) -> NoReturn:
         self.estop()
-        raise self._refusal(f"it holds another {what} than it was given ({held} instead of {asked})")
+        raise self._refusal(f"it holds another {what} than it was given ({held} instead of {requested})")
 
     def _stopped(self) -> RigStopped:
-        return RigStopped(f"{self._name()} stopped: {told(self._status.faults)}. Look at it before it is cleared.")
+        return RigStopped(
+            f"{self._name()} stopped: {fault_text(self._status.faults)}. Look at it before it is cleared."
+        )
 
     def _refusal(self, why: str) -> RigStopped:
         faults = self._status.faults
-        state = f" It is in {self._status.mode.name}" + (f": {told(faults)}." if faults != NO_FAULT else ".")
+        state = f" It is in {self._status.mode.name}" + (f": {fault_text(faults)}." if faults != NO_FAULT else ".")
         return RigStopped(f"{self._name()} refused: {why}.{state}")
 
 

@@ -2,8 +2,8 @@
 
 The order is fixed: open and read limits back, zero the encoders where it hangs, a small pulse whose answer is compared
 with the model's, the start window, a start without a jump; then, tick by tick, a look at the rig's own faults, at
-samples that do not go on, at travel, at how far it leans, at the command, at whether the driven body moves as its
-command and the pendulum on it say, and at the innovations of a bank of Kalman filters, which see an encoder that lies.
+samples that do not go on, at the length of its tick, at travel, at how far it leans, at the command, and at whether
+command, driven body and pendulum agree (`control.watch`), which tells a wrong encoder or drive from a hand.
 Every way out goes through `LiveRig.estop` first.
 
 This is supervision in software on a computer that may hang, not a rated safety function: a rig needs a stop in
@@ -18,19 +18,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from upright.control.sensors import Watch
 from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rig import Rig
-from upright.rigs.board import Board, told
-from upright.rigs.driven import DrivenScale, StillDrive
+from upright.rigs.board import Board, fault_text
+from upright.rigs.doubts import Doubts
 from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
+from upright.rigs.tick_length import TickLength
 from upright.rigs.twin import TwinPort
 
 ALIKE = 1.5
-"""Factor by which the answer to a pulse may differ from the model's: friction of the day, but no doubled counts."""
+"""Factor by which the response to a pulse may differ from the model's: friction varies, counts do not double."""
 PULSES = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Pulses that are tried on the model, in shares of the largest command, until every coordinate would show `PLAIN`."""
 PLAIN = 60
@@ -44,7 +44,7 @@ Event = Callable[[float, str, str], None]
 
 
 def unheard(_t: float, _kind: str, _text: str) -> None:
-    """Events that nobody asked for."""
+    """Events of a fault."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ class Duty:
     near : float
         The same for a start.
     watch : bool
-        Whether the bank of filters runs beside the loop; for a pendulum that is held upright.
+        Whether encoders and drive are doubted beside the loop; for a pendulum that is held upright.
     """
 
     limits: Limits | None
@@ -77,7 +77,7 @@ class Duty:
 
     @property
     def watched(self) -> bool:
-        """Whether a bank of filters can say something of it."""
+        """Whether encoders and drive can be told from hands and friction."""
         return self.watch and self.model is not None and self.at == "inverted" and len(self.model.per_unit) == 2
 
 
@@ -90,24 +90,26 @@ class Supervisor:
     rig : LiveRig
     duty : Duty
     event : callable
-        Told ``(time, kind, text)`` of what happens.
+        Called with ``(time, kind, text)`` of each event.
     stopped : callable
-        Asked at every tick whether somebody wants it to stop; answers with a sentence, or with an empty one.
+        Called at every tick; answers why to stop, or an empty text.
+    clock : callable or None
+        The host's own time [s], with which the board's is compared; None where the board's is virtual.
     """
 
     rig: LiveRig
     duty: Duty
     event: Event = unheard
     stopped: Callable[[], str] = field(default=lambda: "")
+    clock: Callable[[], float] | None = None
     about: Capabilities = field(init=False)
     held: Limits = field(init=False)
     law: Law | Rule = field(init=False)
     faults: Fault = field(init=False, default=NO_FAULT)
     target: tuple[float, ...] = field(init=False, default=())
     _running: RunningLaw | None = field(init=False, default=None)
-    _watch: Watch | None = field(init=False, default=None)
-    _still: StillDrive | None = field(init=False, default=None)
-    _scale: DrivenScale | None = field(init=False, default=None)
+    _doubts: Doubts | None = field(init=False, default=None)
+    _ticking: TickLength = field(init=False)
     _last: Tick | None = field(init=False, default=None)
     _first: Tick | None = field(init=False, default=None)
     _command: float = field(init=False, default=0.0)
@@ -129,16 +131,16 @@ class Supervisor:
                 NO_FAULT, f"{self.about.name} has no limits, and nothing is armed without: write [limits] with "
                 f"command, and [limits.{self.about.coordinates[0]}] with travel, speed and start into its RIG.toml.",
             )  # fmt: skip
-        asked = self.duty.limits
-        assert asked is not None  # as was just asked
+        requested = self.duty.limits
+        assert requested is not None  # as was just asked
         # who stopped it by hand knows, and starts it again on purpose
         left = self.rig.exchange(0.0).faults & ~(Fault.RESET | Fault.STOP)
         if left:
-            self._give_up(left, f"{self.about.name} stopped before: {told(left)}. Look at it, then clear its fault "
-                          "(upright rig doctor --clear).")  # fmt: skip
+            self._give_up(left, f"{self.about.name} stopped before: {fault_text(left)}. Look at it, then clear its "
+                          "fault (upright rig doctor --clear).")  # fmt: skip
         self.rig.clear_fault()
-        self.held = self.rig.configure(asked)
-        if wrong := _wider(self.held, asked, self.about):
+        self.held = self.rig.configure(requested)
+        if wrong := _wider(self.held, requested, self.about):
             self._give_up(NO_FAULT, f"{self.about.name} holds other limits than it was given: {wrong}; do not run it.")
         if zero and not self.about.replayed:
             self._await_rest()
@@ -156,14 +158,14 @@ class Supervisor:
         pulse, expected = self._expected()
         self._await_rest()
         self._arm()
-        found = self.rig.self_test(pulse, PULSE)
+        result = self.rig.self_test(pulse, PULSE)
         self.rig.stop()
-        complaint = found.complaint or unlike(found, expected)
-        told_of = ", ".join(f"{n} {v:.4g}" for n, v in found.moved.items())
-        self.event(self._time, "self-test", f"a pulse of {pulse:.3g} {self.about.command_unit} moved {told_of}")
+        complaint = result.complaint or unlike(result, expected)
+        moves = ", ".join(f"{n} {v:.4g}" for n, v in result.moved.items())
+        self.event(self._time, "self-test", f"a pulse of {pulse:.3g} {self.about.command_unit} moved {moves}")
         if complaint:
             self._give_up(Fault.SELF_TEST, complaint)
-        return replace(found, complaint="")
+        return replace(result, complaint="")
 
     def aim(self, law: Law | Rule) -> Law | Rule:
         """The law as it will run from where the rig is now; still in IDLE, so that a log can be opened with it.
@@ -193,9 +195,7 @@ class Supervisor:
         self._in_window()
         # what takes time is done before anything is switched on
         watched = self.duty.model if self.duty.watched else None
-        self._watch = Watch(watched, self.duty.at) if watched else None
-        self._still = StillDrive(watched, self.duty.at) if watched else None
-        self._scale = DrivenScale(watched, self.duty.at) if watched else None
+        self._doubts = Doubts(watched, self.duty.at, self.about.name) if watched else None
         return fitted
 
     def start(self, mode: Mode = Mode.HOST) -> None:
@@ -211,12 +211,13 @@ class Supervisor:
         self.rig.start(mode, self.law if mode == Mode.MCU and isinstance(self.law, Law) else None)
         self._running, self._mode = RunningLaw(self.law, self.about.period), mode
         self._last, self._first, self._command, self._stale = None, None, 0.0, 0
+        self._ticking = TickLength()
         self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
 
     def _arm(self) -> None:
         """Aiming and opening a log take time: whether the run is still wanted is evaluated just before."""
-        if wish := self.stopped():
-            self._give_up(Fault.STOP, wish)
+        if reason := self.stopped():
+            self._give_up(Fault.STOP, reason)
         self.rig.arm()
 
     def near(self) -> bool:
@@ -231,18 +232,18 @@ class Supervisor:
             return
         tick = self.rig.exchange(0.0)
         if tick.faults:
-            self._give_up(tick.faults, f"{self.about.name} is not started: {told(tick.faults)}.")
+            self._give_up(tick.faults, f"{self.about.name} is not started: {fault_text(tick.faults)}.")
         readings = self.readings(tick)
         if abs(readings[-1] - self.target[-1]) > self.duty.near:
             self._give_up(
                 Fault.START, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
-                f"where it is to be held, and a run starts within {self._shown(self.duty.near)}; bring it there.",
+                f"where it is to be stabilised, and a run starts within {self._shown(self.duty.near)}; bring it there.",
             )  # fmt: skip
         first = RunningLaw(self.law, self.about.period).step(readings, 0.0)  # a reference may ask for all there is
         if abs(first) >= self.held.command:
             self._give_up(
                 Fault.START, f"the law would begin with its largest command, {first:.3g} {self.about.command_unit}; "
-                "bring the rig closer to where it is to be held, and let it rest.",
+                "bring the rig closer to where it is to be stabilised, and let it rest.",
             )  # fmt: skip
 
     def step(self, tick: Tick, reference: float | None = None) -> float:
@@ -253,16 +254,21 @@ class Supervisor:
         RigStopped
             When something is wrong; the command was zero before.
         """
-        if wish := self.stopped():
-            self._give_up(Fault.STOP, wish)
+        if reason := self.stopped():
+            self._give_up(Fault.STOP, reason)
         if tick.mode != self._mode or tick.faults:
-            self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
+            self._give_up(tick.faults, f"{self.about.name} stopped itself: {fault_text(tick.faults)}.{self._likeliest}")
         if self._last is not None and tick.tick <= self._last.tick:
             self._stale += 1
             if self._stale * self.about.period > self.held.watchdog:
                 self._give_up(Fault.STALE, f"{self.about.name} has shown the same sample {self._stale + 1} times.")
             return self._command  # nothing new to answer
         before, self._last, self._first, self._stale = self._last or tick, tick, self._first or tick, 0
+        if self.clock is not None and (longer := self._ticking.sees(tick.time, self.clock())) != 1.0:
+            self._give_up(
+                Fault.MODEL, f"{self.about.name} is not timed as it says: its tick lasts {longer:.3g} times "
+                f"{1e3 * self.about.period:.4g} ms by this computer's clock. Look at the board's clock and prescaler.",
+            )  # fmt: skip
         self._look(self.readings(tick))
         if self._running is None:
             raise BadInput("the loop was not started; call start first.")
@@ -271,11 +277,13 @@ class Supervisor:
             command = self._running.step(readings, reference, time - self._first.time)
             if not math.isfinite(command):
                 self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
-            if self._watch is not None and self._still is not None and self._scale is not None:
+            if self._doubts is not None:
                 # until the host has answered, its last command is what drives the rig
                 drives = command if self._mode == Mode.MCU or time == tick.time else self._command
                 drives = min(max(drives, -self.held.command), self.held.command)
-                self._suspect(self._watch, self._still, self._scale, readings, drives)
+                away = [q - t for q, t in zip(readings, self.target, strict=True)]
+                if wrong := self._doubts.sees(readings, away, drives):
+                    self._give_up(*wrong)
         self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
 
@@ -318,6 +326,10 @@ class Supervisor:
         return self._stale > 0
 
     @property
+    def _likeliest(self) -> str:
+        return "" if self._doubts is None else self._doubts.likeliest
+
+    @property
     def _time(self) -> float:
         return 0.0 if self._last is None else self._last.time
 
@@ -328,33 +340,8 @@ class Supervisor:
         if abs(readings[-1] - self.target[-1]) > self.duty.lean:
             self._give_up(
                 Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} left what is held by "
-                f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell.",
-            )  # fmt: skip
-
-    def _suspect(
-        self, watch: Watch, still: StillDrive, scale: DrivenScale, readings: Sequence[float], command: float
-    ) -> None:
-        """Stop when an encoder lies, or must have died."""
-        away = [q - t for q, t in zip(readings, self.target, strict=True)]
-        watch.see([away], command)
-        said, which = watch.speaks()
-        if said[0]:
-            what = watch.suspicions[int(which[0])]
-            self._give_up(
-                Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
-                "encoder's wiring and counts (upright rig doctor); if a hand pushed it, start again.",
-            )  # fmt: skip
-        wrong = scale.sees(away, command)
-        if wrong == "wrong way round":
-            self._give_up(
-                Fault.MODEL, f"{scale.name} is shown the wrong way round: command and pendulum say that it moves "
-                "against what its encoder shows. Check that encoder's channels (upright rig doctor); if a hand pushed "
-                "it, start again.",
-            )  # fmt: skip
-        if still.sees(readings[still.which], away, command) or wrong:
-            self._give_up(
-                Fault.ENCODER, f"{still.name} shows not a single count although its command must have moved it: its "
-                "encoder is dead, or something holds it fast.",
+                f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell."
+                f"{self._likeliest}",
             )  # fmt: skip
 
     def _give_up(self, fault: Fault, why: str) -> None:
@@ -369,10 +356,10 @@ class Supervisor:
         while moved.time - first.time < patience:
             tick = self.rig.exchange(0.0)
             moved = tick if tick.counts != moved.counts else moved
-            if wish := self.stopped():
-                self._give_up(Fault.STOP, wish)
+            if reason := self.stopped():
+                self._give_up(Fault.STOP, reason)
             if tick.mode != Mode.IDLE:
-                self._give_up(tick.faults, f"{self.about.name} stopped itself: {told(tick.faults)}.")
+                self._give_up(tick.faults, f"{self.about.name} stopped itself: {fault_text(tick.faults)}.")
             if tick.time - moved.time >= REST:
                 return
         self._give_up(Fault.SELF_TEST, f"{self.about.name} does not come to rest within {patience:g} s; hold it still.")
@@ -382,18 +369,18 @@ class Supervisor:
         model = self.duty.model
         if model is None:
             return PULSES[1] * self.held.command, None
-        found = None
+        response = None
         for share in PULSES:
             board = Board(TwinPort(replace(model, scales=()), self.duty.zero))
             about = board.open()
             board.clear_fault()
             board.configure(replace(_free(about), command=self.held.command))
             board.arm()
-            found = board.self_test(share * self.held.command, PULSE)
-            counts = [abs(v * per) for v, per in zip(found.moved.values(), about.counts, strict=True)]
+            response = board.self_test(share * self.held.command, PULSE)
+            counts = [abs(v * per) for v, per in zip(response.moved.values(), about.counts, strict=True)]
             if min(counts) >= PLAIN:
-                return share * self.held.command, found
-        return PULSES[-1] * self.held.command, found
+                return share * self.held.command, response
+        return PULSES[-1] * self.held.command, response
 
     def _own_target(self, law: Law | Rule) -> tuple[float, ...]:
         own = law.target if isinstance(law, Law) else 0.0
@@ -453,26 +440,26 @@ def _free(about: Capabilities) -> Limits:
     return Limits(travel=wide, speed=wide, start=wide, command=about.full_scale, watchdog=1e9, saturation=1e9)
 
 
-def _wider(held: Limits, asked: Limits, about: Capabilities) -> str:
-    """What a rig holds wider, or far narrower, than it was asked to."""
+def _wider(held: Limits, requested: Limits, about: Capabilities) -> str:
+    """What a rig holds wider, or far narrower, than requested."""
     for name in ("travel", "speed", "start"):
-        for which, mine, theirs in zip(about.coordinates, getattr(asked, name), getattr(held, name), strict=True):
+        for which, mine, theirs in zip(about.coordinates, getattr(requested, name), getattr(held, name), strict=True):
             if theirs > mine * (1 + 1e-6) or not theirs > 0:
                 return f"{name} of {which} {theirs:g} instead of {mine:g}"
     for name in ("command", "watchdog", "saturation"):
-        mine, theirs = getattr(asked, name), getattr(held, name)
+        mine, theirs = getattr(requested, name), getattr(held, name)
         if theirs > mine * (1 + 1e-6) + (about.period if name != "command" else 0.0):
             return f"{name} {theirs:g} instead of {mine:g}"
     return ""
 
 
-def unlike(found: SelfTest, expected: SelfTest | None) -> str:
+def unlike(measured: SelfTest, expected: SelfTest | None) -> str:
     """Why the answer to a pulse is not the model's, as sentences; empty when it is."""
     if expected is None:
         return ""
     out: list[str] = []
     for name, wanted in expected.moved.items():
-        moved = found.moved.get(name, 0.0)
+        moved = measured.moved.get(name, 0.0)
         ratio = moved / wanted if wanted else 1.0
         if abs(ratio) < 0.1:
             out.append(f"{name} hardly moved ({moved:.3g}, its model {wanted:.3g}): is its encoder connected?")

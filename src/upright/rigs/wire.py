@@ -223,7 +223,7 @@ class LimitsOnWire:
 class Snapshot(NamedTuple):
     """How it was when the first fault since the last clearing came.
 
-    `moved` are counts in the last speed window, `asked` is the command before its limit [steps]; `lost` counts ticks
+    `moved` are counts in the last speed window, `command` is the command before its limit [steps]; `lost` counts ticks
     that never came and `dropped` frames that the firmware threw away, since its reset.
     """
 
@@ -232,7 +232,7 @@ class Snapshot(NamedTuple):
     tick: int
     sample: Readout
     moved: tuple[int, int]
-    asked: int
+    command: int
     lost: int
     dropped: int
 
@@ -282,8 +282,8 @@ def snapshot(body: bytes) -> Snapshot:
     """Of a reply to `Kind.SNAPSHOT`, after its status."""
     mode, faults, tick = _SNAPSHOT_HEAD.unpack_from(body)
     at, end = _SNAPSHOT_HEAD.size, _SNAPSHOT_HEAD.size + _SAMPLE.size
-    first, second, asked, lost, dropped = _SNAPSHOT_TAIL.unpack_from(body, end)
-    return Snapshot(Mode(mode), Fault(faults), tick, sample(body[at:end]), (first, second), asked, lost, dropped)
+    first, second, command, lost, dropped = _SNAPSHOT_TAIL.unpack_from(body, end)
+    return Snapshot(Mode(mode), Fault(faults), tick, sample(body[at:end]), (first, second), command, lost, dropped)
 
 
 def exchange(value: float, answers: int) -> bytes:

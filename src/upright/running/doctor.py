@@ -1,4 +1,4 @@
-"""Is this rig wired as it is described? Asked before any loop: link, limits, encoders by hand, a small pulse."""
+"""Is this rig wired as it is described? Checked before any loop: link, limits, encoders by hand, a small pulse."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from upright.errors import RigStopped
 from upright.rig import Rig
 from upright.rigs import Board, Fault, LiveRig, TwinPort
-from upright.rigs.board import told
+from upright.rigs.board import fault_text
 from upright.rigs.rigfile import read_rig_file
 from upright.running.rig import described, stage_of
 
@@ -25,7 +25,7 @@ class CheckupFinding:
     """One thing that was looked at; `good` is None where it was not."""
 
     what: str
-    found: str
+    observed: str
     good: bool | None = True
 
 
@@ -46,7 +46,7 @@ class Checkup:
         """The first thing that is wrong, or that nothing is."""
         wrong = [f for f in self.findings if f.good is False]
         if wrong:
-            return f"Do not close a loop: {wrong[0].what}: {wrong[0].found}"
+            return f"Do not close a loop: {wrong[0].what}: {wrong[0].observed}"
         left = [f.what for f in self.findings if f.good is None]
         rest = f" Not looked at: {', '.join(left)}." if left else ""
         return f"Link, limits and encoders of {self.name} answer as they should.{rest}"
@@ -61,7 +61,7 @@ def check_up(
     ----------
     path : Path
     hand : callable, optional
-        Asked, with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
+        Called with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
         A twin's own hand does it when omitted.
     clear : bool
         Whether latched faults are forgotten first.
@@ -84,26 +84,26 @@ def check_up(
             rig.close()
         about = beside.prepare()
         ticks = f"{about.name}, {len(about.counts)} encoders, a tick every {1e3 * about.period:.4g} ms"
-        out.append(CheckupFinding(what="link", found=ticks))
+        out.append(CheckupFinding(what="link", observed=ticks))
         out += _described(model, about.period, about.counts)
         held = ", ".join(f"{n} {v:.4g}" for n, v in zip(about.coordinates, beside.held.travel, strict=True))
         volts, silence = f"{beside.held.command:.4g} {about.command_unit}", f"{1e3 * beside.held.watchdog:.4g} ms"
         held = f"travel {held}; command {volts}; watchdog {silence}"
-        out.append(CheckupFinding(what="limits, read back", found=held))
+        out.append(CheckupFinding(what="limits, read back", observed=held))
         for i, name in enumerate(about.coordinates):
             out.append(_by_hand(rig, model, i, name, hand))
         if not pulse or about.replayed:
-            out.append(CheckupFinding(what="a small pulse", found="not given", good=None))
+            out.append(CheckupFinding(what="a small pulse", observed="not given", good=None))
         else:
             if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
                 rig.port.hold(beside.duty.zero)
                 rig.port.let_go()
             moved = beside.check().moved
             shown = ", ".join(f"{n} {v:.4g}" for n, v in moved.items())
-            out.append(CheckupFinding(what="a small pulse", found=shown))
+            out.append(CheckupFinding(what="a small pulse", observed=shown))
     except RigStopped as stop:
         what = "a small pulse" if beside.faults & Fault.SELF_TEST else "stopped"
-        out.append(CheckupFinding(what=what, found=str(stop), good=False))
+        out.append(CheckupFinding(what=what, observed=str(stop), good=False))
     finally:
         rig.estop()
         rig.close()
@@ -113,10 +113,10 @@ def check_up(
 def _described(model: Rig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
     """Whether the rig is the one that was described."""
     same = math.isclose(period, model.period, rel_tol=1e-3)
-    told_of = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
-    out = [CheckupFinding(what="servo period", found=told_of, good=same)]
+    compared = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
+    out = [CheckupFinding(what="servo period", observed=compared, good=same)]
     alike = np.allclose(np.abs(counts), model.per_unit, rtol=1e-6)
-    return [*out, CheckupFinding(what="counts", found=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
+    return [*out, CheckupFinding(what="counts", observed=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
 
 
 def _by_hand(
@@ -127,23 +127,23 @@ def _by_hand(
     size = MOVED if unit == "rad" else MOVED / 10
     before = rig.exchange(0.0)
     if before.faults:
-        return CheckupFinding(what=f"{name} by hand", found=told(before.faults), good=False)
+        return CheckupFinding(what=f"{name} by hand", observed=fault_text(before.faults), good=False)
     what = f"{name} by hand"
     if hand is not None:
         if not hand(f"Move {name} by hand in its positive sense by some {'degrees' if unit == 'rad' else 'mm'}."):
-            return CheckupFinding(what=what, found="not moved", good=None)
+            return CheckupFinding(what=what, observed="not moved", good=None)
     elif isinstance(rig, Board) and isinstance(rig.port, TwinPort):
         away = np.zeros(2 * len(model.per_unit))
         away[2 * i] = 2 * size
         rig.port.hold(next(iter(model.plant.equilibria)), away)
     else:
-        return CheckupFinding(what=what, found="nobody moved it", good=None)
+        return CheckupFinding(what=what, observed="it was not moved", good=None)
     moved = (rig.exchange(0.0).counts[i] - before.counts[i]) / per
     shown = f"{math.degrees(moved):.3g} degrees" if unit == "rad" else f"{1e3 * moved:.3g} mm"
     if abs(moved) < size / 10:
-        return CheckupFinding(what=what, found=f"showed {shown}: not connected, or not this channel", good=False)
+        return CheckupFinding(what=what, observed=f"showed {shown}: not connected, or not this channel", good=False)
     if moved < 0:
         return CheckupFinding(
-            what=what, found=f"showed {shown}: it counts the wrong way, swap its channels", good=False
+            what=what, observed=f"showed {shown}: it counts the wrong way, swap its channels", good=False
         )
-    return CheckupFinding(what=what, found=f"showed {shown}")
+    return CheckupFinding(what=what, observed=f"showed {shown}")

@@ -36,7 +36,7 @@ MODES = {"host": Mode.HOST, "mcu": Mode.MCU}
 
 @dataclass(frozen=True, kw_only=True)
 class RunRequest:
-    """What is asked of a run.
+    """Request for a run.
 
     `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
     `from_rest` begins where the rig rests, however far that is from what is held, as a swing-up does.
@@ -79,7 +79,7 @@ class RigRun:
 
     Attributes
     ----------
-    wish : RunRequest
+    request : RunRequest
     file : RigFile
     model : Rig
         As it is known.
@@ -91,7 +91,7 @@ class RigRun:
         Of the law, and of the model that the supervisor compared the rig with.
     """
 
-    wish: RunRequest
+    request: RunRequest
     file: RigFile
     model: Rig
     end: RunEnd
@@ -116,7 +116,7 @@ class RigRun:
     def unrest(self) -> tuple[float, ...]:
         """Root mean square of the deviations over the second half [rad or m]; from their mean with a reference."""
         half = self.away[len(self.away) // 2 :]
-        half = half - half.mean(axis=0) if self.wish.reference and half.size else half
+        half = half - half.mean(axis=0) if self.request.reference and half.size else half
         return tuple(np.sqrt(np.mean(half**2, axis=0)).tolist()) if half.size else ()
 
     @property
@@ -132,15 +132,15 @@ class RigRun:
     @property
     def way_back(self) -> Effort | None:
         """What the drive had to give in all; None where no law ran."""
-        if self.wish.law is None or self.log is None or not len(self.log):
+        if self.request.law is None or self.log is None or not len(self.log):
             return None
         return effort(self._applied, self.limit, self.model.converter)
 
     @property
     def saturates(self) -> bool:
         """Whether the command was at its limit for longer than the drive's own lag hides."""
-        taken = self.way_back
-        return taken is not None and taken.saturated * self.end.ticks * self.model.period > FELT
+        back = self.way_back
+        return back is not None and back.saturated * self.end.ticks * self.model.period > FELT
 
     @property
     def _applied(self) -> Array:
@@ -152,12 +152,12 @@ class RigRun:
     def effort(self) -> RestEffort | None:
         """What holding took over the last third; None where no law held it to the end, or it followed what moved."""
         log = self.log
-        if self.wish.law is None or self.end.stopped or log is None or len(log) < LEAST:
+        if self.request.law is None or self.end.stopped or log is None or len(log) < LEAST:
             return None
         columns = log.columns
         if any(np.ptp(resting(columns[name])) > 0 for name, _ in log.header.references):
             return None
-        if self.wish.from_rest and float(np.abs(resting(self.away)[:, -1]).max()) > ARRIVED:
+        if self.request.from_rest and float(np.abs(resting(self.away)[:, -1]).max()) > ARRIVED:
             return None
         body = [c.name for c in self.model.plant.coordinates].index(self.model.plant.inputs[0].on)
         return rest_effort(self.t, self._applied, self.limit, body=self.away[:, body], count=self.count[body])
@@ -187,16 +187,16 @@ class RigRun:
         if end.stopped:
             ran = f" after {self.t[-1]:.3g} s" if self.t.size else " before its loop began"
             return f"Stopped{ran}: {end.stopped}"
-        how = f"{self.wish.seconds:g} s, {end.ticks} ticks"
+        how = f"{self.request.seconds:g} s, {end.ticks} ticks"
         late = f", {end.late} of them late" if end.late else ", none late"
         log = "" if self.complete else f" The log is not whole: {end.log_message or 'rows are missing'}."
-        if self.wish.law is None:
+        if self.request.law is None:
             return f"The signal was put out for {how}{late}.{log}"
         last = self.model.plant.coordinates[-1]
         size = max(self.unrest[-1], self.count[-1])
         size = f"{math.degrees(size):.2g} degrees" if last.unit == "rad" else f"{1e3 * size:.2g} mm"
         size = f"one encoder count, {size}" if self.unrest[-1] < self.count[-1] else size
-        what = "varied by" if self.wish.reference else "stayed within"
+        what = "varied by" if self.request.reference else "stayed within"
         kind = STABILISED if self.quiet and not self.saturates else SATURATED if self.quiet else BUSY
         return f"{kind.capitalize()} for {how}{late}; {last.name} {what} {size} (rms, second half){self._rest()}.{log}"
 
@@ -204,22 +204,22 @@ class RigRun:
         if self.effort is None:
             return ""
         body = self.effort.body
-        told = f"; the command at rest {shown(self.effort, self.limit, self.model.unit)}"
+        text = f"; the command at rest {shown(self.effort, self.limit, self.model.unit)}"
         if body is None:
-            return told
+            return text
         name, unit = self.model.plant.inputs[0].on, self.model.plant.coordinates[0].unit
         size = f"{math.degrees(body.size):.2g} degrees" if unit == "rad" else f"{1e3 * body.size:.2g} mm"
-        return f"{told}; {name} cycles by {size} every {body.period:.2g} s"
+        return f"{text}; {name} cycles by {size} every {body.period:.2g} s"
 
 
 def run_rig(
-    wish: RunRequest, folder: Path, *, watch: Callable[[RunState], str] = lambda _: ""
+    request: RunRequest, folder: Path, *, watch: Callable[[RunState], str] = lambda _: ""
 ) -> RigRun:  # fmt: skip
-    """Run what is asked, log it, and say what it came to.
+    """Run what is requested, log it, and report the result.
 
     Parameters
     ----------
-    wish : RunRequest
+    request : RunRequest
     folder : Path
         Takes the log.
     watch : callable
@@ -232,50 +232,51 @@ def run_rig(
         said why.
     """
     library()  # what a log needs is missed before anything moves
-    file = read_rig_file(wish.rig)
+    file = read_rig_file(request.rig)
     model, _ = described(file)
-    balance, basis = wish.law is not None, MEASURED if file.hardware and wish.law is None else model.basis
+    balance, basis = request.law is not None, MEASURED if file.hardware and request.law is None else model.basis
     zero = file.zero if file.zero in model.plant.equilibria else next(iter(model.plant.equilibria))
     at = file.at if file.at in model.plant.equilibria else zero
-    if wish.law is not None:
-        law, designed = read_law(wish.law, model, at, zero)
+    if request.law is not None:
+        law, designed = read_law(request.law, model, at, zero)
         basis &= designed
         if file.hardware:
-            _check_accepted(wish, basis)
-        if wish.reference:
+            _check_accepted(request, basis)
+        if request.reference:
             if not isinstance(law, Law) or not law.reference_names or not np.any(law.D[:, law.readings :]):
                 raise BadInput(
-                    f"the law of {wish.law} follows no reference; design one that does: upright design FIT --track "
+                    f"the law of {request.law} follows no reference; design one that does: upright design FIT --track "
                     "COORDINATE."
                 )
             unit = model.plant.coordinates[0].unit
-            law = replace(law, references=np.array(signal(wish.reference, unit, model.period, wish.seconds)))
+            law = replace(law, references=np.array(signal(request.reference, unit, model.period, request.seconds)))
     else:
-        samples = wish.samples or signal(wish.excite, model.unit, model.period, wish.seconds)
+        samples = request.samples or signal(request.excite, model.unit, model.period, request.seconds)
         law = open_loop(samples, len(model.per_unit), model.period)
-    references = _references(law, model) if wish.law is not None else ()
+    references = _references(law, model) if request.law is not None else ()
     folder.mkdir(parents=True, exist_ok=True)
-    path = fresh(folder, wish.stem, ".mcap")
+    path = fresh(folder, request.stem, ".mcap")
     order = RunOrder(
-        make=partial(stage_of, wish.rig, balance=balance, tilt=wish.tilt, watch=wish.watch,
-                     from_rest=wish.from_rest, bolted=wish.bolted), law=as_values(law),
-        seconds=wish.seconds, log=path, mode=MODES[wish.mode], check=wish.check, rig_text=read_text(wish.rig),
-        references=references, accepted=wish.accept.strip() if basis.level == NOT_TRUSTED else "",
+        make=partial(stage_of, request.rig, balance=balance, tilt=request.tilt, watch=request.watch,
+                     from_rest=request.from_rest, bolted=request.bolted), law=as_values(law),
+        seconds=request.seconds, log=path, mode=MODES[request.mode], check=request.check,
+        rig_text=read_text(request.rig),
+        references=references, accepted=request.accept.strip() if basis.level == NOT_TRUSTED else "",
     )  # fmt: skip
-    if file.hardware or wish.own_process:
+    if file.hardware or request.own_process:
         end = run_in_process(order, watch=watch, paced=file.hardware)
     else:
         end = _inline(order, law, watch)
     log = read_log(path) if path.exists() else None
-    return RigRun(wish=wish, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
+    return RigRun(request=request, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
 
 
-def _check_accepted(wish: RunRequest, basis: Basis) -> None:
+def _check_accepted(request: RunRequest, basis: Basis) -> None:
     """Refuse to arm a law from a model that is not trusted, unless somebody says why it runs all the same."""
-    if basis.level == NOT_TRUSTED and not wish.accept.strip():
+    if basis.level == NOT_TRUSTED and not request.accept.strip():
         raise BadInput(
-            f"the law of {wish.law} is not armed on hardware, for its model is not trusted: {basis.sentence} Identify "
-            'the rig until it is, or say why it runs all the same, which the log keeps: --accept "REASON".'
+            f"the law of {request.law} is not armed on hardware, for its model is not trusted: {basis.sentence} "
+            'Identify the rig until it is, or say why it runs all the same, which the log keeps: --accept "REASON".'
         )
 
 
@@ -291,15 +292,15 @@ def _references(law: Law | Rule, model: Rig) -> tuple[tuple[str, str], ...]:
 
 def _inline(order: RunOrder, law: Law | Rule, watch: Callable[[RunState], str]) -> RunEnd:
     """The same in this process, in virtual time."""
-    said, seen = "", 0
+    reason, states = "", 0
 
     def show(state: RunState) -> None:
-        nonlocal said, seen
-        seen += 1
-        if seen % 100 == 0:  # often enough for an eye, in virtual time
-            said = said or watch(state)
+        nonlocal reason, states
+        states += 1
+        if states % 100 == 0:  # often enough for an eye, in virtual time
+            reason = reason or watch(state)
 
-    return carry_out(order, law=law, show=show, stopped=lambda: said)
+    return carry_out(order, law=law, show=show, stopped=lambda: reason)
 
 
 def fresh(folder: Path, stem: str, ending: str) -> Path:

@@ -266,7 +266,7 @@ class Simulator:
         Raises
         ------
         BadInput
-            When shapes do not fit together, or there is no GPU where one was asked for.
+            When shapes do not fit together, or there is no GPU where one was requested.
         """
         if device not in ("cpu", "gpu"):
             raise BadInput(f"motions are computed on device 'cpu' or 'gpu', got {device!r}.")
@@ -310,6 +310,16 @@ class Simulator:
     def rows(self) -> Mapping[str, int]:
         """Place of each number of a lane in the working array: ``W[place * width + lane]``."""
         return self._layout.rows
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Names of those of `rows` that stay as they are while a motion lasts."""
+        return self._layout.settings
+
+    @property
+    def law_rows(self) -> tuple[str, ...]:
+        """Names of the numbers of the controller, which follow `names` in the kernel's table of parameters."""
+        return self._layout.numbers
 
     def call(
         self,

@@ -4,12 +4,28 @@ from __future__ import annotations
 
 from upright.errors import BadInput
 from upright.records import Record
+from upright.units import known, same_dimension, scale
 
 SLOWEST = 2.0
 """Seconds between samples beyond which nothing of a pendulum, a cart or a disk is seen."""
 
 USUAL = 1e-4, 0.5
 """Seconds between samples, least and most, that are usual."""
+
+
+def with_time_unit(record: Record, unit: str) -> Record:
+    """Record whose time [s] was read from numbers in `unit`, such as "ms", that state none themselves.
+
+    Raises
+    ------
+    BadInput
+        When it is no unit of time.
+    """
+    if not unit:
+        return record
+    if not (known(unit) and same_dimension(unit, "s")):
+        raise BadInput(f"expected a unit of time, such as 'ms', 'us' or 's', got '{unit[:40]}'.")
+    return record.replace(t=record.t * scale(unit))
 
 
 def check_clock(record: Record) -> None:
@@ -27,7 +43,10 @@ def check_clock(record: Record) -> None:
                                                     ("ns", "nanoseconds", 1e-9))
              if USUAL[0] <= step * scale <= USUAL[1]]  # fmt: skip
     file = record.provenance.file or "the log"
-    likely = " or ".join(f"{word} (name the column 't [{name}]')" for name, word in units[:2])
+    likely = " or ".join(
+        f"{word} (name the column 't [{name}]', or give --time-unit {name}; in a study time_unit = \"{name}\")"
+        for name, word in units[:2]
+    )
     raise BadInput(
         f"'{file}': expected a sample at least every {SLOWEST:g} s, got one every {step:.4g} s; "
         + (f"its clock may count {likely}." if likely else "check the unit of its time column.")

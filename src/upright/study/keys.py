@@ -86,6 +86,7 @@ _SHARED = (
     Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
     Key("reader", '"table"', f"reader of the file ({', '.join(READERS.own)}), when it is not recognised"),
     Key("time", '"stamp"', "column that holds the time [s], when the reader took another one"),
+    Key("time_unit", '"ms"', "unit of the time column, when its name states none; seconds if left out"),
 )
 
 SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
@@ -95,7 +96,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("title", '"Crane, three gains"', "heading of the report"),
             Key("source", '"https://..."', "where the data come from; text for the report"),
             Key("rig", "table", "the plant, and what its servo keeps to"),
-            Key("parameters", "table", "every number of the plant: known or asked"),
+            Key("parameters", "table", "every number of the plant: known or estimated"),
             Key("actuator", "table", "what stands between command and force"),
             Key("sensors", "table", "how a column becomes a coordinate"),
             Key("drive", "table", "what commands the (first) input; a run without it is free"),
@@ -112,7 +113,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key(
                 "guessed",
                 "true",
-                "nobody named the plant: its numbers count as a guess until a run that was not fitted is predicted",
+                "the plant is a guess: its numbers count as one until a run that was not fitted is predicted",
             ),
             Key("substeps", "2", "integration steps per sample"),
             Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if left out"),
@@ -137,12 +138,20 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key(
                 "assumed",
                 "true",
-                "a number that nobody measured: no estimate that rests on it can be used",
+                "a number that was not measured: no estimate that rests on it can be used",
             ),
             Key("measured", "true", "a known number that somebody measured on this rig, as one with an uncertainty is"),
             Key("guess", '"1.6e-3 kg m^2"', "a number to estimate, and where to start"),
-            Key("min", "0", "lower bound of the estimate; the plant's own if left out"),
-            Key("max", '"5e-3 kg m^2"', "upper bound of the estimate"),
+            Key(
+                "min",
+                "0",
+                "lower bound of the estimate, else the plant's own; least that an assumed number may be, else a tenth",
+            ),
+            Key(
+                "max",
+                '"5e-3 kg m^2"',
+                "upper bound of the estimate; most that an assumed number may be, else ten times it",
+            ),
         ),
     ),
     "actuator": (
@@ -157,6 +166,8 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
                 for name, what in ACTUATOR.items()
             ),
             Key("converter", '"0.3 mV"', "smallest step of the command, for simulations; not rounded if left out"),
+            Key("bits", "12", "of the converter instead of its step, together with"),
+            Key("range", '"10 V"', "its largest command to either side: the step is 2 range/2^bits"),
         ),
     ),
     "sensors": ("[sensors.COORDINATE]", _SENSOR),

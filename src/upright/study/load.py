@@ -24,7 +24,7 @@ from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
 from upright.rig import Hardware, Rig
-from upright.study.clock import check_clock
+from upright.study.clock import check_clock, with_time_unit
 from upright.study.coordinates import Sensors
 from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.keys import names
@@ -117,7 +117,7 @@ def load_study(
     text : str, optional
         The study itself, when it is in no file; `path` then only names it.
     records : mapping of file name to Record, optional
-        Logs that are at hand already.
+        Logs that are read already.
     plant : type of Plant, optional
         In the place of the one that the study names.
 
@@ -133,7 +133,7 @@ def load_study(
     plant = plant or read_plant(study)
     rig = read_rig(study, plant, drive_unit(study), fixed)
     folder = Path(data) if data is not None else path.parent
-    logs = {(name, "", ""): record for name, record in (records or {}).items()}
+    logs = {(name, "", "", ""): record for name, record in (records or {}).items()}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
     hardware = read_hardware(study, plant, rig, [log.provenance.rig for log in logs.values()])
     rig = with_noise(rig, runs)
@@ -154,22 +154,23 @@ def load_study(
     )
 
 
-def _log(run: Section, folder: Path, logs: dict[tuple[str, str, str], Record]) -> Record:
+def _log(run: Section, folder: Path, logs: dict[tuple[str, ...], Record]) -> Record:
     """Record of the file a run names, read once."""
     from upright.readers import read
 
     name = run.text_of("file", "logs/run_01.csv")
     reader = run.text_of("reader", "csv") if "reader" in run else ""
     time = run.text_of("time", "t") if "time" in run else ""
-    key = (name, reader, time)
+    unit = run.text_of("time_unit", "ms") if "time_unit" in run else ""
+    key = (name, reader, time, unit)
     if key not in logs:
         file = folder / name
         if not os.path.exists(file):  # Path.exists raises for a name that is too long
             raise run.error("file", f"the log {str(file)[-200:]} does not exist; {_instead(file, folder)}")
         with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None)
-        with run.at("time"):
-            logs[key] = record.replace(t=record[time]) if time else record
+        with run.at("time_unit" if unit else "time"):
+            logs[key] = with_time_unit(record.replace(t=record[time]) if time else record, unit)
     return logs[key]
 
 
@@ -265,8 +266,8 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
     readings: dict[str, Array] = {}
     quanta: dict[str, float] = {}
     sensors = read_sensors(study, run, plant)
-    told = Sensors(by_coordinate=sensors, locked=locked)
-    _check_sums(run, told, plant)
+    plant_sensors = Sensors(by_coordinate=sensors, locked=locked)
+    _check_sums(run, plant_sensors, plant)
     wanted = run.names("measured", coordinates, tuple(n for n in sensors if n not in locked and n not in held_names))
     for name in (*wanted, *held_names):
         if name not in sensors:
@@ -274,7 +275,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
             raise run.error(key, f'{name} has no sensor; add [sensors.{name}] with column = "..."')
         if name in locked:
             raise run.error("locked", f"{name} is locked in this run, so it is neither held nor measured")
-        values, quanta[name], noticed = told.read(record, name)
+        values, quanta[name], noticed = plant_sensors.read(record, name)
         readings[name] = grid.outputs(values)
         notes += noticed
     measured = tuple(n for n in coordinates if n in wanted and n not in held_names)
@@ -290,7 +291,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
     loop = None
     if "loop" in run:
         scene = Scene(
-            plant=plant, record=record, grid=grid, coordinates=told, drive=drives[0], unit=drive_unit(study),
+            plant=plant, record=record, grid=grid, coordinates=plant_sensors, drive=drives[0], unit=drive_unit(study),
             command=str(study.section("drive").values.get("column", "")),
         )  # fmt: skip
         loop = read_loop(run, scene)
@@ -372,24 +373,24 @@ def _nuisances(run: Section, key: str, plant: type[Plant]) -> list[tuple[str, Se
     if key == "spread":
         valid = tuple(n for n in valid if n.partition(".")[0] in SPREADS)
     table = run.section(key)
-    found: list[tuple[str, Section, str]] = []
+    out: list[tuple[str, Section, str]] = []
     for name, value in table.values.items():
         inner = table.section(name) if isinstance(value, dict) else table
         entries = [(f"{name}.{last}", last) for last in inner.values] if inner is not table else [(name, name)]
         for whole, last in entries:
             if whole not in valid:
                 raise inner.error(last, f"{key} has no '{whole}'; {nearest(whole, valid)}")
-            found.append((whole, inner, last))
-    return found
+            out.append((whole, inner, last))
+    return out
 
 
-def _check_sums(run: Section, told: Sensors, plant: type[Plant]) -> None:
+def _check_sums(run: Section, sensors: Sensors, plant: type[Plant]) -> None:
     """Refuse a zero or a scale of one sensor that several coordinates are read from."""
-    asked = {"unknown": run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)))}
-    asked["shared"] = tuple(name for name, _, _ in _nuisances(run, "shared", plant))
-    for key, wanted in asked.items():
+    listed = {"unknown": run.names("unknown", (*PER_RUN, *sensor_nuisances(plant)))}
+    listed["shared"] = tuple(name for name, _, _ in _nuisances(run, "shared", plant))
+    for key, wanted in listed.items():
         for kind, _, of in (name.partition(".") for name in wanted):
-            if of and not told.one_sensor(kind, of):
+            if of and not sensors.one_sensor(kind, of):
                 raise run.error(key, _not_alone(kind, of))
 
 
@@ -410,22 +411,22 @@ def _horizon(run: Section, grid: Grid) -> float | tuple[float, ...] | None:
         return None
     listed: list[Any] = value if isinstance(value, list) else [value]
     with run.at("horizon"):
-        found = [in_si(v, "s", "horizon") for v in listed]
-    if len(found) > _HORIZONS:
+        horizons = [in_si(v, "s", "horizon") for v in listed]
+    if len(horizons) > _HORIZONS:
         raise run.error(
-            "horizon", f"horizon lists {len(found)} times, and {_HORIZONS} are the most; take a few of them"
+            "horizon", f"horizon lists {len(horizons)} times, and {_HORIZONS} are the most; take a few of them"
         )
     step, length = grid.t[1] - grid.t[0], grid.t[-1] - grid.t[0]
-    for horizon in found:
+    for horizon in horizons:
         if not horizon >= 1.5 * step and not (_restart(run) == "kalman" and horizon >= step):
             raise run.error(
                 "horizon", f"a horizon of {horizon:g} s is less than two samples of {step:g} s; take a longer one"
             )
-    if not found:
+    if not horizons:
         raise run.error("horizon", 'horizon must be a time such as "0.5 s" or a list of times, got []')
     if isinstance(value, list):
-        return tuple(found)
-    return None if found[0] >= length else found[0]
+        return tuple(horizons)
+    return None if horizons[0] >= length else horizons[0]
 
 
 def _restart(run: Section) -> Any:

@@ -118,16 +118,16 @@ def _pid(section: Section, scene: Scene) -> ClosedLoop:
         raise section.error("kp", "a PID law needs kp, ki or kd, such as kp = 0.8")
     period = scene.period / every
     smooth = filter_of(section, period)
-    given = section.entries("reference")
-    if len(given) > len(measured):
+    entries = section.entries("reference")
+    if len(entries) > len(measured):
         raise section.error(
-            "reference", f"{len(measured)} measured coordinates take as many references, got {len(given)}"
+            "reference", f"{len(measured)} measured coordinates take as many references, got {len(entries)}"
         )
     references = [
-        reference_of(r, "1" if raw else coordinates[n], section, scene) for r, n in zip(given, measured, strict=False)
+        reference_of(r, "1" if raw else coordinates[n], section, scene) for r, n in zip(entries, measured, strict=False)
     ]
     channels = [
-        Channel(measured=n, reference=f"reference {i + 1}" if i < len(given) else "", kp=gains["kp"][i],
+        Channel(measured=n, reference=f"reference {i + 1}" if i < len(entries) else "", kp=gains["kp"][i],
                 ki=gains["ki"][i], kd=gains["kd"][i], on=on, filter=smooth)
         for i, n in enumerate(measured)
     ]  # fmt: skip
@@ -142,9 +142,9 @@ def _general(section: Section, scene: Scene) -> ClosedLoop:
     coordinates = {c.name: c.unit for c in scene.plant.coordinates}
     measured = section.names("measured", coordinates, (next(iter(coordinates)),))
     raw, every = is_raw(section), every_of(section, scene)
-    given = section.entries("reference")
-    units = [coordinates[measured[min(i, len(measured) - 1)]] for i in range(len(given))]
-    references = [reference_of(r, "1" if raw else u, section, scene) for r, u in zip(given, units, strict=True)]
+    entries = section.entries("reference")
+    units = [coordinates[measured[min(i, len(measured) - 1)]] for i in range(len(entries))]
+    references = [reference_of(r, "1" if raw else u, section, scene) for r, u in zip(entries, units, strict=True)]
     matrices: dict[str, Array] = {}
     for key in ("A", "B", "C", "D"):
         try:
@@ -157,7 +157,7 @@ def _general(section: Section, scene: Scene) -> ClosedLoop:
         law = Law(
             A.reshape(C.size, C.size) if A.size == C.size**2 else np.atleast_2d(A),
             B.reshape(C.size, D.size) if B.size == C.size * D.size else np.atleast_2d(B), C, D, measured=measured,
-            reference_names=tuple(f"reference {i + 1}" for i in range(len(given))), period=scene.period / every,
+            reference_names=tuple(f"reference {i + 1}" for i in range(len(entries))), period=scene.period / every,
         )  # fmt: skip
     return _closed_loop(section, limited(section, law), references, scene, every, raw=raw)
 
@@ -170,18 +170,18 @@ def _recovered(section: Section, scene: Scene) -> ClosedLoop:
         raise section.error("kind", 'a law is recovered from the column it put out; add command = "duty"')
     columns = columns_of(section, "reference")
     with section.at("kind"):
-        found = recover_law(
+        recovery = recover_law(
             scene.record, measured=[scene.sensors[n].column for n in measured], references=columns, command=command,
             feedforward=columns_of(section, "feedforward"),
         )  # fmt: skip
-    if found.quality == "poor":
+    if recovery.quality == "poor":
         raise section.error(
-            "kind", f"no law could be recovered from '{command}': {found.sentence} Write the law as kind = \"pid\","
+            "kind", f"no law could be recovered from '{command}': {recovery.sentence} Write the law as kind = \"pid\","
             " or leave loop out and let the recorded command drive the plant",
         )  # fmt: skip
-    law = found.law
+    law = recovery.law
     every = matching(section, scene.period / law.period)
-    factors = found.feedforward
+    factors = recovery.feedforward
     law = replace(
         law, B=np.column_stack([law.B, np.zeros((len(law.A), len(factors)))]),
         D=np.hstack([law.D, [list(factors.values())]]), reference_names=(*law.reference_names, *factors),
@@ -190,7 +190,7 @@ def _recovered(section: Section, scene: Scene) -> ClosedLoop:
     names_of = {scene.sensors[n].column: n for n in measured}
     law = replace(law, measured=tuple(names_of[c] for c in law.measured))
     loop = _closed_loop(section, law, references, scene, every, raw=True)
-    return replace(loop, note=f"loop recovered from the log: {found.structure}. {found.sentence}")
+    return replace(loop, note=f"loop recovered from the log: {recovery.structure}. {recovery.sentence}")
 
 
 KINDS = {"state": _state, "pid": _pid, "general": _general, "recover": _recovered}

@@ -34,11 +34,12 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
 
 def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) -> dict[str, Any]:
     """What `fit.json` holds, as plain values; `crossed` adds what each run's prediction by the others scored."""
+    ranges = {a.name: a.range for a in fit.assumptions}
     known = {
         name: Estimate(
             value=p.value,
             stderr=p.uncertainty,
-            interval=(p.value - 1.96 * p.uncertainty, p.value + 1.96 * p.uncertainty),
+            interval=ranges.get(name, (p.value - 1.96 * p.uncertainty, p.value + 1.96 * p.uncertainty)),
             unit=p.unit,
             status="assumed" if p.assumed else "known",
         )
@@ -64,7 +65,8 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
                 "size": a.size,
                 "percent_per_percent": {n: round(e, 6) for n, e in a.follows.items()},
                 "rests": resting(a),
-                "without_it": a.without,
+                "range": a.range,
+                "ratios": a.ratios,
             }
             for a in fit.assumptions
         ],
@@ -94,10 +96,10 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
     return plain_values(content)
 
 
-def _estimated(said: Hardware, found: Mapping[str, Estimate]) -> Hardware:
+def _estimated(hardware: Hardware, estimates: Mapping[str, Estimate]) -> Hardware:
     """The description with the drive's numbers as they were estimated."""
-    asked = {n: e for n, e in said.entries.items() if f"actuator.{n}" in found}
-    return said.given({n: replace(e, value=found[f"actuator.{n}"].value) for n, e in asked.items()})
+    entries = {n: e for n, e in hardware.entries.items() if f"actuator.{n}" in estimates}
+    return hardware.with_entries({n: replace(e, value=estimates[f"actuator.{n}"].value) for n, e in entries.items()})
 
 
 def _fields(of: object, names: str) -> dict[str, Any]:
@@ -119,14 +121,14 @@ def provenance(study: Study) -> dict[str, Any]:
 
 
 def write_response_fit(
-    answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "", said: Hardware | None = None
+    answer: FrequencyFit, folder: Path, plant: str, title: str, source: str = "", known_hardware: Hardware | None = None
 ) -> None:
-    """Write `frequency.csv` and `fit.json`, which `upright design` reads; `said` is what is known of the rig."""
+    """Write `frequency.csv` and `fit.json`, which `upright design` reads; `known_hardware` is the rig's."""
     folder.mkdir(parents=True, exist_ok=True)
     answer.data.to_csv(folder / "frequency.csv")
     study = Study(
         path=folder / "frequency.csv", plant=plant, model=answer.rig, runs=(), title=title, source=source,
-        hardware=said or Hardware(),
+        hardware=known_hardware or Hardware(),
     )  # fmt: skip
     write_fit(answer.fit, study, folder / "fit.json")
 
@@ -175,12 +177,12 @@ def chosen_study(study: Study, ladder: Ladder) -> str:
     text = StudyText(study.path)
     lines = text.text.splitlines()
     cut = _lines_of_ladder(lines)
-    told = {_line(text, n) for n in ladder.left_out}
+    left_lines = {_line(text, n) for n in ladder.left_out}
     out = [f"# {study.path.name} as far as the ladder kept it; files are where the study's own are: use --data."]
     for number, line in enumerate(lines, start=1):
         if number in cut:
             continue
-        if number in told:
+        if number in left_lines:
             out += [f"# not kept: {line.strip()}", *_nothing(study, ladder.left_out, text, number)]
         else:
             out.append(line)
@@ -200,11 +202,11 @@ def _line(text: StudyText, name: str) -> int:
 
 def _nothing(study: Study, names: Collection[str], text: StudyText, number: int) -> list[str]:
     """A line for a parameter that must have a value, though it does nothing."""
-    found = next(n for n in names if _line(text, n) == number)
+    name = next(n for n in names if _line(text, n) == number)
     plant = study.model.plant
-    if found in ACTUATOR or _has_default(study, found):
+    if name in ACTUATOR or _has_default(study, name):
         return []
-    return [f"{found} = {neutral(plant, found):g}"]
+    return [f"{name} = {neutral(plant, name):g}"]
 
 
 def _has_default(study: Study, name: str) -> bool:
@@ -215,13 +217,13 @@ def _has_default(study: Study, name: str) -> bool:
 
 def _lines_of_ladder(lines: Sequence[str]) -> set[int]:
     """Numbers of the lines of [[ladder]] tables, up to the next table."""
-    inside, found = False, set[int]()
+    inside, numbers = False, set[int]()
     for number, line in enumerate(lines, start=1):
         if line.lstrip().startswith("["):
             inside = line.replace(" ", "").startswith("[[ladder]]")
         if inside:
-            found.add(number)
-    return found
+            numbers.add(number)
+    return numbers
 
 
 def can_be_trimmed(study: Study, ladder: Ladder) -> bool:

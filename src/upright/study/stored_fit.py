@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -66,6 +67,17 @@ class StoredFit:
         before_running(self.plant, self.path)
         return find(self.plant, self.path.parent)
 
+    def fitted_run(self, source: str) -> str:
+        """Label of a fitted run that shares samples with a run of this `source`; empty where none does."""
+        log, start, stop = _stretch(source)
+        origins: Any = (self.content.get("provenance") or {}).get("runs") or {}
+        scores: Any = self.content.get("runs") or {}
+        for label, origin in origins.items() if log else ():
+            other, first, last = _stretch(str(origin))
+            if other == log and first < stop and start < last and (scores.get(label) or {}).get("role") == "fit":
+                return str(label)
+        return ""
+
     def rig(self, *, seed: int = 0, draws: int = 200) -> Rig:
         """The rig as identified, and rigs drawn from the fit's covariance.
 
@@ -112,31 +124,38 @@ class StoredFit:
         """Where a parameter comes from: ``"identified"``, ``"assumed"`` or ``"known"``."""
         entry = self.content["parameters"].get(name)
         status = entry.get("status") if isinstance(entry, dict) else None
-        asked = name in self.content.get("estimated", ())
-        return "identified" if asked else "assumed" if status == "assumed" else "known"
+        estimated = name in self.content.get("estimated", ())
+        return "identified" if estimated else "assumed" if status == "assumed" else "known"
 
     @property
     def scores(self) -> dict[str, dict[str, float]]:
         """Fit percent by label and signal of the runs that were fitted, as far as the file tells."""
         runs: Any = self.content.get("runs")
-        told = {} if not isinstance(runs, dict) else runs
+        by_run = {} if not isinstance(runs, dict) else runs
         return {
             label: {s: float(p) for s, p in run["fit_percent"].items() if isinstance(p, int | float)}
-            for label, run in told.items()
+            for label, run in by_run.items()
             if isinstance(run, dict) and run.get("role") == "fit" and isinstance(run.get("fit_percent"), dict)
         }
 
     def covariance(self, among: Collection[str]) -> tuple[list[str], NDArray[np.float64]]:
         """Those of the estimates that are `among` the names, and their covariance; zeros where the file has none."""
         estimated: list[str] = list(self.content.get("estimated", []))
-        kept = [i for i, n in enumerate(estimated) if n in among]
-        names = [estimated[i] for i in kept]
+        places = [i for i, n in enumerate(estimated) if n in among]
+        names = [estimated[i] for i in places]
         entries = [self.content["parameters"].get(n) or {} for n in names]
         errors = np.array([float(e.get("stderr") or 0.0) if isinstance(e, dict) else 0.0 for e in entries])
         correlation = np.array([[float(v or 0.0) for v in row] for row in self.content.get("correlation") or []])
         if correlation.shape != (len(estimated), len(estimated)):
             correlation = np.zeros((len(estimated), len(estimated)))
-        return names, correlation[np.ix_(kept, kept)] * np.outer(errors, errors)
+        return names, correlation[np.ix_(places, places)] * np.outer(errors, errors)
+
+
+def _stretch(source: str) -> tuple[str, float, float]:
+    """The sha256 of a run's log, and which seconds of it the run is; "" for a log without one."""
+    log, window = re.search(r"\(sha256 (\w+)\)", source), re.search(r"; ([-+.\de]+) to ([-+.\de]+) s(?:;|$)", source)
+    seconds = (float(window[1]), float(window[2])) if window else (-math.inf, math.inf)
+    return log[1] if log else "", *seconds
 
 
 def read_fit(path: Path) -> StoredFit:
@@ -198,15 +217,15 @@ def basis_of(verdict: str, answers: Sequence[Judgement], *, trusted: bool) -> Ba
     """A fit's own verdict for what rests on it: what speaks against it, else what was not tested or holds in part."""
     against = [a for a in answers if a.answer == "no"]
     if not trusted:
-        told = _told(against[0]) if against else verdict or "it is not to be trusted."
-        return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {told}")
+        reason = _worded(against[0]) if against else verdict or "it is not to be trusted."
+        return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {reason}")
     less = [*against, *(a for a in answers if a.answer in ("in part", "not tested"))]
     if less:
-        return Basis(level=RESERVED, sentence=f"The fit has reservations: {_told(less[0])}")
+        return Basis(level=RESERVED, sentence=f"The fit has reservations: {_worded(less[0])}")
     return Basis(level=TRUSTED, sentence=verdict or "The fit is trusted.")
 
 
-def _told(a: Judgement) -> str:
+def _worded(a: Judgement) -> str:
     """An answer with the first of its reasons."""
     return replace(a, advice="", reasons=a.reasons[:1]).text()
 
@@ -227,9 +246,9 @@ def _answer(entry: Any) -> Judgement:
 
 def _hardware(content: Mapping[str, Any], values: Mapping[str, float]) -> Hardware:
     """What the file says of drive, encoders and servo; an older one has its drive among the parameters alone."""
-    said = _table(content.get("rig", {}), "rig")
+    stored = _table(content.get("rig", {}), "rig")
     entries = _drive(content, values)
-    for name, entry in _table(said.get("entries", {}), "rig.entries").items():
+    for name, entry in _table(stored.get("entries", {}), "rig.entries").items():
         place = f"rig.entries.{name}"
         table = _table(entry, place)
         unit, source = _text(table.get("unit"), f"{place}.unit"), _text(table.get("source"), f"{place}.source")
@@ -243,20 +262,22 @@ def _hardware(content: Mapping[str, Any], values: Mapping[str, float]) -> Hardwa
         if drive in values and not math.isclose(value, values[drive], rel_tol=1e-9):
             raise BadInput(f"{place}.value is {value:g}, and parameters.{drive} is {values[drive]:g}")
         entries[name] = Entry(value=value, unit=unit, source=source)
-    name, vendor = (_text(said.get(key, ""), f"rig.{key}") for key in ("name", "vendor"))
+    name, vendor = (_text(stored.get(key, ""), f"rig.{key}") for key in ("name", "vendor"))
     return Hardware(name=name, vendor=check_vendor(vendor), entries=entries)
 
 
 def _drive(content: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Entry]:
     """Numbers of the drive that do something, as the fit's parameters tell them."""
-    asked, out = content.get("estimated", []), dict[str, Entry]()
+    estimated, out = content.get("estimated", []), dict[str, Entry]()
     for name, number in ACTUATOR.items():
         if name in values and values[name] != number.default:
             entry = content["parameters"][name]
             table: Mapping[str, Any] = entry if isinstance(entry, dict) else {}
             known = "measured" if table.get("stderr") else "known"
             out[name.partition(".")[2]] = Entry(
-                value=values[name], unit=str(table.get("unit") or ""), source="identified" if name in asked else known
+                value=values[name],
+                unit=str(table.get("unit") or ""),
+                source="identified" if name in estimated else known,
             )
     return out
 
@@ -378,5 +399,5 @@ def _number(value: Any, place: str, largest: float = LARGEST) -> float:
 
 
 def _shown(value: Any) -> str:
-    said = repr(value)
-    return said if len(said) < 40 else f"{said[:37]}..."
+    text = repr(value)
+    return text if len(text) < 40 else f"{text[:37]}..."

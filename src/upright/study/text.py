@@ -21,7 +21,7 @@ from upright.files import read_text
 
 _LEAST = 1e-60
 SOURCES = ("assumed", "measured")
-"""What a known number may be said to be, as in ``{ value = "10 V", measured = true }``."""
+"""Source of a known number, as in ``{ value = "10 V", measured = true }``."""
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
 
@@ -220,8 +220,8 @@ def source_of(value: Any) -> str:
     """What a number of a study rests on, in the study's own word: "known" where it says nothing of it."""
     if not isinstance(value, dict):
         return "known"
-    told: dict[str, Any] = value
-    return next((word for word in SOURCES if told.get(word)), "measured" if "uncertainty" in told else "known")
+    entry: dict[str, Any] = value
+    return next((word for word in SOURCES if entry.get(word)), "measured" if "uncertainty" in entry else "known")
 
 
 def in_si(value: Any, unit: str, what: str) -> float:

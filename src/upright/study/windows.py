@@ -18,27 +18,27 @@ def windows(runs: Sequence[Run]) -> tuple[str, ...]:
     for run in runs:
         if run.record is not None:
             logs.setdefault(run.source.partition(";")[0], []).append(run)  # file and hash
-    said: list[str] = []
+    sentences: list[str] = []
     for log, own in logs.items():
         parts = [(run.role, float(run.t[0]), float(run.t[-1])) for run in own]
         first, last = min(r.record[0] for r in own if r.record), max(r.record[1] for r in own if r.record)
         sentence = window_sentence(parts, first, last)
         file = log.partition(" (sha256")[0]
-        said.append(sentence if len(logs) == 1 or not file else f"{file}: {sentence[0].lower()}{sentence[1:]}")
-    return tuple(said)
+        sentences.append(sentence if len(logs) == 1 or not file else f"{file}: {sentence[0].lower()}{sentence[1:]}")
+    return tuple(sentences)
 
 
 def window_sentence(parts: Iterable[Part], first: float, last: float) -> str:
     """What is fitted and predicted of a record from `first` to `last` [s], and which share of it that is."""
     parts = sorted(parts, key=lambda part: part[1])
-    said: list[str] = []
+    clauses: list[str] = []
     for role in dict.fromkeys(role for role, _, _ in parts):
         spans = ", ".join(f"{start:.4g} to {stop:.4g}" for own, start, stop in parts if own == role)
-        said.append(f"{VERBS[role]} {spans} s")
+        clauses.append(f"{VERBS[role]} {spans} s")
     covered, reached = 0.0, first
     for _, start, stop in parts:
         covered += max(0.0, stop - max(start, reached))
         reached = max(reached, stop)
     share = 100 * covered / (last - first) if last > first else 100.0
-    text = " and ".join(said)
+    text = " and ".join(clauses)
     return f"{text[0].upper()}{text[1:]}, {share:.{0 if share >= 1 else 1}f} % of the record."

@@ -44,7 +44,7 @@ class Command:
     flags : mapping of str to Flag
     given : callable
         Turns what was typed, by parameter, into what the verb is called with.
-    told : callable, optional
+    lines : callable, optional
         What is printed piece by piece, texts or answers, where the verb returns no answer.
     wrong : callable
         Whether an answer, with the flags, ends the command with exit code 3; interrupted ones end with 130.
@@ -65,8 +65,8 @@ class Command:
     )
     hidden: Iterable[str] = ()
     flags: Mapping[str, Flag] = field(default_factory=dict[str, Flag])
-    given: Callable[[dict[str, Any]], dict[str, Any]] = lambda typed: typed
-    told: Callable[[Any], Iterable[Any]] | None = None
+    prepare: Callable[[dict[str, Any]], dict[str, Any]] = lambda typed: typed
+    lines: Callable[[Any], Iterable[Any]] | None = None
     wrong: Callable[..., bool] = lambda answer, **flags: False
     resumes: bool = False
 
@@ -81,11 +81,11 @@ class Command:
         return " ".join(description(self.verb).partition("\n\n")[0].split())
 
 
-def command(group: str = Command.group, **said: Any) -> Callable[[V], V]:
-    """Decorator that offers a verb as a command; see `Command` for what can be said."""
+def command(group: str = Command.group, **settings: Any) -> Callable[[V], V]:
+    """Decorator that offers a verb as a command; see `Command` for its settings."""
 
     def declare(verb: V) -> V:
-        verb.command = Command(verb=verb, group=group, **said)  # type: ignore[attr-defined]
+        verb.command = Command(verb=verb, group=group, **settings)  # type: ignore[attr-defined]
         return verb
 
     return declare
@@ -93,8 +93,8 @@ def command(group: str = Command.group, **said: Any) -> Callable[[V], V]:
 
 def command_of(verb: Any) -> Command:
     """The command that was declared for a verb, or the one that follows from the verb alone."""
-    said = vars(verb).get("command")
-    return said if isinstance(said, Command) else Command(verb=verb)
+    declared = vars(verb).get("command")
+    return declared if isinstance(declared, Command) else Command(verb=verb)
 
 
 def description(verb: Any) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
+from upright.renamed import WORN, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, write_page
@@ -52,32 +53,33 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 
 @command(
     "Course",
-    names={"experiment": "--experiment -e", "rig": "--rig"},
+    names={"experiment": "--experiment -e", "rig": "--rig", "nonideal": "--nonideal --worn"},
     metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml", "accept": "REASON"},
     helps={
         "experiment": "Only this one, and what it stands on.",
         "rig": "linear, furuta, rectilinear or torsional, else the paper's; or RIG.toml.",
-        "worn": "Rigs with physics that no model has, such as stiction, ripple and play.",
+        "nonideal": "Rigs with unmodelled effects: stiction, ripple and play.",
     },
     ranges={"seed": (None, None)},
-    given=_nobody_needed,
+    prepare=_nobody_needed,
     resumes=True,  # goes on in the folder that it reads
     more="""
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml they are made on the rig itself; you are asked for what no drive can do.
+    With a RIG.toml they are made on the rig itself; you are prompted for what no drive can do.
 
     upright lab
     upright lab --rig linear --seed 3
-    upright lab --rig furuta --worn
+    upright lab --rig furuta --nonideal
     upright lab --experiment 1b --experiment 2 -o out
     upright lab --rig RIG.toml
     """,
 )
+@renamed(WORN)
 def lab(
     *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
-    fresh: bool = False, workers: Workforce = 1, worn: bool = False, accept: str = "", progress: Progress = silent,
+    fresh: bool = False, workers: Workforce = 1, nonideal: bool = False, accept: str = "", progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
@@ -92,24 +94,24 @@ def lab(
     experiment : str or sequence of str, optional
         Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
     rig : str, optional
-        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of a rig at hand
+        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
     seed : int
-        Which rig of the make; 0 is the one as designed. Of a rig at hand, that of the rigs drawn from its fit.
+        Random seed of the rig model; 0 is nominal. On hardware, that of the rigs drawn from its fit.
     out : path, optional
-        Folder; upright-lab[-KIND][-SEED][-worn] when omitted.
+        Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
         Make again what the folder holds already.
     workers : int, str or executor
         Who runs experiments that need nothing of each other: processes of this machine, the address of a Dask
         scheduler, or an executor of `concurrent.futures`.
-    worn : bool
+    nonideal : bool
         Twins with physics that models leave out, of which fits read as those of real rigs do.
     accept : str, optional
         Why laws from a fit that is not trusted drive hardware all the same; the logs keep it. Without it such laws are
         not armed.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     ask : callable, optional
         Asks the person beside a rig for something, in a sentence; answers whether it was done. Hardware needs it.
     watching : callable, optional
@@ -134,7 +136,7 @@ def lab(
         make_named(rig)
     kind = Path(rig).stem if itself else rig
     named = "-".join(
-        ["upright-lab", *([kind] if kind else []), *([str(seed)] if seed else []), *(["worn"] if worn else [])]
+        ["upright-lab", *([kind] if kind else []), *([str(seed)] if seed else []), *(["nonideal"] if nonideal else [])]
     )
     at = Path(named if out is None else out)
     if at.exists() and not at.is_dir():
@@ -149,15 +151,15 @@ def lab(
     from upright.workers import Workers
 
     shared = Workers.of(workers)
-    asked = texts(experiment)
+    requested = texts(experiment)
     beside = Path() if out is None else at
-    live = _live(rig, beside, ask, watching, worn=worn, alone=shared.alone, accept=accept) if itself else None
+    live = _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept) if itself else None
     rig = rig if live is None else typed(live.file.path)
-    laboratory.chosen_experiments(asked, rig, live)  # says what is wrong with the call before anything is written
+    laboratory.chosen_experiments(requested, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
-            asked, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared, worn=worn,
-            live=live,
+            requested, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared,
+            nonideal=nonideal, live=live,
         )  # fmt: skip
         pressed.patient = True
         progress("writing the report", 1.0)
@@ -165,7 +167,7 @@ def lab(
         report = write_html(at / "report.html", book)
         pdf = write_pdf(at / "report.pdf", book) if available() else None
     sound = sum(t.chapter.sound for t in session.results)
-    told = Chapter(
+    page = Chapter(
         title=book.title, verdict=f"{sound} of {len(session.results)} verdicts are sound.",
         sound=sound == len(session.results), parts=book.cover, warnings=book.notes, steps=book.steps,
         numbers=laboratory.session_summary(session, report, pdf), finished=not session.interrupted,
@@ -177,38 +179,36 @@ def lab(
     hints = ["Each chapter of the report ends with the commands that repeat its steps."]
     if pdf is None:
         hints.append("PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")
-    done = Laboratory(
+    answer = Laboratory(
         session=session, book=replace(book, chapters=tuple(replace(c, about=took[c.key]) for c in book.chapters)),
         interrupted=session.interrupted or pressed.times > 0, hints=tuple(hints),
     )  # fmt: skip
-    return Answer(done, told, [report] if pdf is None else [report, pdf])
+    return Answer(answer, page, [report] if pdf is None else [report, pdf])
 
 
 def _live(
     rig: str, folder: Path, ask: Callable[[str], bool] | None,
-    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, worn: bool, alone: bool,
+    watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, nonideal: bool, alone: bool,
     accept: str,
 ) -> LiveStand:  # fmt: skip
-    """The rig of a RIG.toml; what cannot be had of it is said first."""
+    """The rig of a RIG.toml; what it cannot do is reported first."""
     from upright.experiments.stand.live import live_stand, nobody, nobody_watches
     from upright.experiments.stand.templates import write_templates
     from upright.report.symbols import typed
 
-    if worn or not alone:
-        raise BadInput("--worn and --workers are for twins of makes; a rig at hand is as it is, and there is one.")
+    if nonideal or not alone:
+        raise BadInput("--nonideal and --workers are for twins of makes; on hardware there is one rig, as it is.")
     if rig.startswith("serial:"):
         path = write_templates(folder, rig.removeprefix("serial:"))
         raise BadInput(
-            "a rig of hardware needs a description and limits, which nobody else can know: fill in "
+            "a rig of hardware needs a description and limits, which only you know: fill in "
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
-        raise BadInput(
-            "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."
-        )
+        raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")
     return live
 
 
@@ -268,9 +268,9 @@ def reproduce(
     from upright.rig.makes import NOMINAL
 
     at = folder_if_given(out, pdf)
-    done = again(NOMINAL, seed)
-    told = chapter(done)
-    return Answer(done, told, [] if at is None else write_page(told, at / "reproduce.html", pdf))
+    result = again(NOMINAL, seed)
+    page = chapter(result)
+    return Answer(result, page, [] if at is None else write_page(page, at / "reproduce.html", pdf))
 
 
 @command(
@@ -300,7 +300,7 @@ def survey(
     n : int, optional
         Answers behind printed means or shares, at least 2.
     scale : str or (int, int)
-        Ends of the scale of the ratings.
+        Ends of the scale of the ratings, ``"1-4"`` or ``"0-100"``; people may rate between its whole numbers.
     out : path, optional
         Folder for report.html.
     pdf : bool
@@ -314,7 +314,7 @@ def survey(
     Raises
     ------
     BadInput
-        When the sheet cannot be read, or it is not told on how many answers it rests.
+        When the sheet cannot be read, or the number of answers is not specified.
     """
     from upright.questionnaire.chapter import chapter
     from upright.questionnaire.sheet import Ratings, read_sheet, read_table
@@ -324,10 +324,10 @@ def survey(
     at = folder_if_given(out, pdf)
     if n is not None and n < 2:
         raise BadInput(f"--n needs a whole number of at least 2, got {n}.")
-    said = scale if isinstance(scale, str) else f"{scale[0]}-{scale[1]}"
-    ends = re.fullmatch(r"\s*(\d{1,2})\s*(?:-|to)\s*(\d{1,2})\s*", said)
+    scale_text = scale if isinstance(scale, str) else f"{scale[0]}-{scale[1]}"
+    ends = re.fullmatch(r"\s*(\d{1,3})\s*(?:-|to)\s*(\d{1,3})\s*", scale_text)
     if ends is None or int(ends[1]) >= int(ends[2]):
-        raise BadInput(f"--scale needs its two ends, such as 1-4, got '{said}'.")
+        raise BadInput(f"--scale needs its two ends, such as 1-4, got '{scale_text}'.")
     limits = (int(ends[1]), int(ends[2]))
     if isinstance(file, str | os.PathLike):
         file = Path(file)
@@ -340,11 +340,11 @@ def survey(
         if n is not None:
             raise BadInput(f"--n is for printed summaries; '{name}' holds single answers, which are counted.")
     elif n is None:
-        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they are said to rest on.")
+        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they rest on.")
     again = f"{command}{'' if n is None else f' --n {n}'} --json"
-    told = chapter(
+    page = chapter(
         sheet, title=f"Survey: {Path(name).stem.replace('_', ' ')}", source=name, answers=n, scale=limits,
         steps=(Step("Hand the numbers on.", again),) if command else (),
     )  # fmt: skip
-    files = [] if at is None else write_page(told, at / "report.html", pdf)
-    return Answer(sheet, replace(told, numbers={**told.numbers, "report": str(files[0]) if files else ""}), files)
+    files = [] if at is None else write_page(page, at / "report.html", pdf)
+    return Answer(sheet, replace(page, numbers={**page.numbers, "report": str(files[0]) if files else ""}), files)

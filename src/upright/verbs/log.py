@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from upright.verbs.values import Log
 
 
-def read(file: Log, *, reader: str = "") -> Record:
+def read(file: Log, *, reader: str = "", time_unit: str = "") -> Record:
     """Record of a log as its program wrote it.
 
     Parameters
@@ -39,6 +39,8 @@ def read(file: Log, *, reader: str = "") -> Record:
         the content.
     reader : str, optional
         Reader of the log, when it is not recognised.
+    time_unit : str, optional
+        Unit of a file's time column that states none, such as "ms"; seconds when omitted.
 
     Returns
     -------
@@ -50,12 +52,14 @@ def read(file: Log, *, reader: str = "") -> Record:
     BadInput
         When the log cannot be read, with the line and the column of the trouble.
     """
-    return open_log(file, reader)[0]
+    return open_log(file, reader, time_unit)[0]
 
 
 @keeps_its_inputs
-def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False) -> Answer[Inspection]:
-    """What a log holds: columns, sample rate, quanta, gaps, lying columns.
+def show(
+    log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False, time_unit: str = ""
+) -> Answer[Inspection]:
+    """What a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
     Parameters
     ----------
@@ -63,7 +67,9 @@ def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = Fa
     out : path, optional
         Folder for the picture show-LOG.svg, or the picture's own name (SVG, PNG).
     plot : bool
-        Draw the columns also where no `out` is named: into the folder at hand.
+        Draw the columns also where no `out` is named: into the current folder.
+    time_unit : str, optional
+        Unit of a file's time column that states none, such as "ms".
 
     Returns
     -------
@@ -80,27 +86,28 @@ def show(log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = Fa
     from upright.report.page import Step
     from upright.report.symbols import typed
 
-    record, path = open_log(log)
-    seen = inspect(record)
+    record, path = open_log(log, time_unit=time_unit)
+    inspection = inspect(record)
     files: list[Path] = []
     if plot or out is not None:
         from upright.report.drawing import save
 
         at = Path() if out is None else Path(out)
         files.append(at if at.suffix in (".svg", ".png") else picture_path(path, folder(at)))
-        save(draw_columns(record, seen), files[-1])
+        save(draw_columns(record, inspection), files[-1])
+    clock = f" --time-unit {time_unit}" if time_unit else ""
     onward = Step(
-        "Write a study file, filled in with what was recognised.", f"upright init {typed(path)} -o study.toml"
+        "Write a study file, filled in with what was recognised.", f"upright init {typed(path)}{clock} -o study.toml"
     )
-    numbers = asdict(seen) | {"figure": str(files[0]) if files else ""}
-    return Answer(seen, replace(chapter(record, seen), steps=(onward,), numbers=numbers), files)
+    numbers = asdict(inspection) | {"figure": str(files[0]) if files else ""}
+    return Answer(inspection, replace(chapter(record, inspection), steps=(onward,), numbers=numbers), files)
 
 
-@command("Log", name="show", defaults={"out": "."}, more="upright show swing.csv")
+@command("Log", name="show", defaults={"out": "."}, metavars={"time_unit": "UNIT"}, more="upright show swing.csv")
 def show_logs(
-    logs: Sequence[str | os.PathLike[str]], *, out: str | os.PathLike[str] = "", plot: bool = True
+    logs: Sequence[str | os.PathLike[str]], *, out: str | os.PathLike[str] = "", plot: bool = True, time_unit: str = ""
 ) -> Iterator[Answer[Inspection]]:
-    """Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.
+    """Print and draw what a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
     Readable are ECP exports, tab-separated and comma-separated text with or without names, MATLAB version 5, CSV
     exports of ROS bags and upright's own logs of runs (MCAP); the format is recognised from the content.
@@ -113,6 +120,8 @@ def show_logs(
         Folder for all files.
     plot : bool
         Draw the columns to show-LOG.svg.
+    time_unit : str
+        Unit of a time column that states none, such as ms.
 
     Yields
     ------
@@ -122,17 +131,19 @@ def show_logs(
     at, figures = folder(out), list[Path]()
     steps: tuple[Step, ...] = ()
     for k, log in enumerate(logs, start=1):
-        seen = show(log, out=picture_path(Path(log), at, figures) if plot else None)
-        figures += seen.files
-        steps = steps or seen.chapter.steps
-        yield Answer(seen.value, replace(seen.chapter, steps=steps if k == len(logs) else ()), seen.files)
+        inspection = show(log, out=picture_path(Path(log), at, figures) if plot else None, time_unit=time_unit)
+        figures += inspection.files
+        steps = steps or inspection.chapter.steps
+        yield Answer(
+            inspection.value, replace(inspection.chapter, steps=steps if k == len(logs) else ()), inspection.files
+        )
 
 
-def picture_path(log: Path, out: Path, taken: Sequence[Path] = ()) -> Path:
+def picture_path(log: Path, out: Path, used: Sequence[Path] = ()) -> Path:
     """Where the columns of a log are drawn, beside the pictures of other logs that may be called the same."""
     stem = f"show-{_stem(log)}"
     path, n = out / f"{stem}.svg", 2
-    while path in taken:
+    while path in used:
         path, n = out / f"{stem}-{n}.svg", n + 1
     return path
 
@@ -211,9 +222,9 @@ def doctor(
     else:
         record, path = open_log(log)
     diagnosis = examine(record, known, wiring, before=mended)
-    told = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
-    told = replace(told, numbers=_plain_diagnosis(diagnosis, page))
-    return Answer(diagnosis, told, [] if page is None else write_page(told, page, pdf))
+    written = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
+    written = replace(written, numbers=_plain_diagnosis(diagnosis, page))
+    return Answer(diagnosis, written, [] if page is None else write_page(written, page, pdf))
 
 
 def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]:
@@ -242,7 +253,7 @@ def _file(log: Log) -> Path | None:
 
 def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
     """A diagnosis as plain dicts, lists, text and numbers; pictures stay in the page."""
-    said = ("kind", "columns", "severity", "sentence", "evidence", "advice", "key")
+    names = ("kind", "columns", "severity", "sentence", "evidence", "advice", "key")
     return {
         "file": diagnosis.file,
         "rig": diagnosis.rig,
@@ -250,7 +261,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
         "samples": diagnosis.samples,
         "duration": diagnosis.duration,
         "wrong": bool(diagnosis.wrong),
-        "findings": [{name: getattr(f, name) for name in said} for f in diagnosis.findings],
+        "findings": [{name: getattr(f, name) for name in names} for f in diagnosis.findings],
         "checked": list(diagnosis.checked),
         "unchecked": dict(diagnosis.unchecked),
         "page": str(html) if html is not None else "",
@@ -259,7 +270,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
 
 @command(
     "Log",
-    metavars={"out": "STUDY.toml", "plant": "NAME"},
+    metavars={"out": "STUDY.toml", "plant": "NAME", "time_unit": "UNIT"},
     helps={
         "out": "Study to write, or a folder for LOG.toml.",
         "plant": "Plant, when the columns do not tell: pendulum, furuta, torsional-2, ...",
@@ -275,8 +286,9 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
 )
 @keeps_its_inputs
 def init(
-    log: Log, *, out: str | os.PathLike[str] | None = None, plant: str = "", reader: str = "", force: bool = False
-) -> Answer[str]:
+    log: Log, *, out: str | os.PathLike[str] | None = None, plant: str = "", reader: str = "", time_unit: str = "",
+    force: bool = False,
+) -> Answer[str]:  # fmt: skip
     """Write a commented study file from a log, filled in with what could be recognised.
 
     It guesses the plant, which columns measure and which one drives, units, encoder counts, rest levels, the sign of
@@ -294,6 +306,8 @@ def init(
         Plant, when the columns do not tell.
     reader : str, optional
         Reader of the log, when it is not recognised.
+    time_unit : str, optional
+        Unit of a file's time column that states none, such as "ms".
     force : bool
         Replace a study that exists.
 
@@ -330,10 +344,11 @@ def init(
     if plant:
         find(plant)
     if record is None:
-        record, _ = open_log(path, reader)
+        record, _ = open_log(path, reader, time_unit)
     text = draft(record, inspect(record), beside or path, study, plant=plant)
-    if reader:
-        text = text.replace("[defaults]\n", f'[defaults]\nreader = "{reader}"\n')
+    for key, value in (("reader", reader), ("time_unit", time_unit)):
+        if value:
+            text = text.replace("[defaults]\n", f'[defaults]\n{key} = "{value}"\n')
     files: list[Path] = []
     if out is not None:
         files.append(replace_file(study, text.encode()))
@@ -342,7 +357,9 @@ def init(
         files.append(beside)
     told = ("# Fits ", "# GUESSED")
     guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(told)]
-    marked = (line.split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line)
+    marked = (
+        line.removeprefix("# ").split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line
+    )
     measure = list(dict.fromkeys(marked))
     if measure:
         guessed.append(f"Placeholders to replace by what you measured: {', '.join(measure)}")
@@ -418,18 +435,18 @@ def law(
             f"{path.name} holds the columns {', '.join(record.names)}; say which one the law put out (--command) and"
             " which it read (--measured, and --reference if it followed one)."
         )
-    found = recover_law(
+    recovery = recover_law(
         record, measured=texts(measured), references=texts(reference), command=command,
         feedforward=texts(feedforward), every=every,
     )  # fmt: skip
-    plain = as_json(found)
-    told = replace(chapter(record, found, typed(path.name)), numbers=json.loads(plain))
+    plain = as_json(recovery)
+    page = replace(chapter(record, recovery, typed(path.name)), numbers=json.loads(plain))
     files: list[Path] = []
     if at is not None:
         from upright.report.drawing import save
 
         files = [at / f"law-{_stem(path)}.{ending}" for ending in ("json", "svg")]
         replace_file(files[0], f"{plain}\n".encode())
-        save(draw_law(record, found), files[1])
-        files += write_page(told, at / f"law-{_stem(path)}.html", pdf)
-    return Answer(found, told, files)
+        save(draw_law(record, recovery), files[1])
+        files += write_page(page, at / f"law-{_stem(path)}.html", pdf)
+    return Answer(recovery, page, files)

@@ -29,7 +29,7 @@ _CONVERTED = (".csv", ".parquet", ".mat")
     name="log show",
     helps={"plot": "Draw the columns to show-LOG.svg."},
     defaults={"out": "."},
-    given=lambda typed: {**typed, "out": typed["out"] if typed["plot"] else None},
+    prepare=lambda typed: {**typed, "out": typed["out"] if typed["plot"] else None},
     more="upright log show run.mcap --plot",
 )
 @keeps_its_inputs
@@ -43,7 +43,7 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     out : path, optional
         Folder for the picture show-LOG.svg.
     plot : bool
-        Draw the columns also where no `out` is named: into the folder at hand.
+        Draw the columns also where no `out` is named: into the current folder.
 
     Returns
     -------
@@ -59,17 +59,17 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     from upright.report.run import chapter, draw_run
     from upright.verbs.log import picture_path
 
-    found = read_log(log)
+    run = read_log(log)
     files: list[Path] = []
-    if (plot or out is not None) and len(found) > 1:
+    if (plot or out is not None) and len(run) > 1:
         from upright.report.drawing import save
 
         files.append(picture_path(Path(log), folder(Path() if out is None else out)))
-        save(draw_run(found), files[-1])
-    return Answer(found, chapter(found), files)
+        save(draw_run(run), files[-1])
+    return Answer(run, chapter(run), files)
 
 
-def _rows_told(chunks: Iterator[Fresh]) -> Iterator[str]:
+def _rows_as_text(chunks: Iterator[Fresh]) -> Iterator[str]:
     """Events and the last row of every chunk, with the units of its columns."""
     rows = 0
     for fresh in chunks:
@@ -88,7 +88,7 @@ def _rows_told(chunks: Iterator[Fresh]) -> Iterator[str]:
     name="log tail",
     metavars={"patience": "SECONDS"},
     ranges={"patience": (0.0, None)},
-    told=_rows_told,
+    lines=_rows_as_text,
     more="upright log tail run.mcap",
 )
 def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
@@ -133,7 +133,7 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
 def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvaged]:
     """Write the rows of a torn log, up to its first error, to a whole file.
 
-    Every row that is kept was checked; how many were kept and lost is said. The log itself stays as it is.
+    Every row that is kept was checked; the counts of kept and lost rows are reported. The log itself stays as it is.
 
     Parameters
     ----------
@@ -156,8 +156,8 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
     from upright.report.run import recovered_chapter
 
     at = Path(f"{Path(log).stem}-recovered.mcap") if out is None else Path(out)
-    found = recover(log, at)
-    return Answer(found, recovered_chapter(found), [at])
+    salvaged = recover(log, at)
+    return Answer(salvaged, recovered_chapter(salvaged), [at])
 
 
 @command(name="log convert", metavars={"out": "FILE"}, more="upright log convert run.mcap -o run.parquet")
@@ -194,11 +194,11 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     record = read_log(log).record(counts=True)
     {".csv": record.to_csv, ".parquet": record.to_parquet, ".mat": record.to_mat}[at.suffix](at)
     notes = (Part("Notes", (Points(record.provenance.notes),)),) if record.provenance.notes else ()
-    told = Chapter(
+    page = Chapter(
         title=f"{Path(log).name} as {at.name}", verdict=f"{len(record)} rows of {len(record.names) + 1} columns.",
         parts=notes, numbers={"rows": len(record), "columns": ["t", *record.names], "file": str(at)},
     )  # fmt: skip
-    return Answer(record, told, [at])
+    return Answer(record, page, [at])
 
 
 @command(
@@ -235,6 +235,6 @@ def log_replay(log: PathLike) -> Answer[Replay]:
     from upright.logs.replay import replay
     from upright.report.run import replayed
 
-    found = read_log(log)
-    again = replay(found)
-    return Answer(again, replayed(found, again))
+    run = read_log(log)
+    again = replay(run)
+    return Answer(again, replayed(run, again))

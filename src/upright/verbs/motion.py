@@ -82,9 +82,9 @@ def simulate(
         raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
     samples = round(seconds / dt) + 1
     t = np.arange(samples, dtype=np.float64) * dt
-    given_drive = {f"actuator.{name}": float(value) for name, value in (actuator or {}).items()}
-    drive = ({} if rig is None else dict(rig.drive)) | given_drive
-    for name in given_drive:
+    own_drive = {f"actuator.{name}": float(value) for name, value in (actuator or {}).items()}
+    drive = ({} if rig is None else dict(rig.drive)) | own_drive
+    for name in own_drive:
         if name not in ACTUATOR:
             known = [n.partition(".")[2] for n in ACTUATOR]
             short = name.partition(".")[2]
@@ -99,11 +99,11 @@ def simulate(
     loop = _loop(plant, law, point, dt, memory, limit, steps)
     if rig is not None and isinstance(loop, Law):  # late and rounded as the rig is, once
         loop = replace(loop, delay=0.0, resolution=steps, command_resolution=rig.converter)
-    given = _command(u, t, len(plant.inputs))
-    x = motion(plant, drive, x0, given, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
+    command = _command(u, t, len(plant.inputs))
+    x = motion(plant, drive, x0, command, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
     _check_bounded(t, x[:, : len(names)], names)
     signals = {name: x[:, i] for i, name in enumerate(names)}
-    put_out = x[:, len(names) :] if loop is not None else given
+    put_out = x[:, len(names) :] if loop is not None else command
     commands = {}
     for j, i in enumerate(plant.inputs):
         commands[i.name] = np.zeros(samples) if put_out is None else np.clip(put_out[:, j], -limit, limit)
@@ -127,23 +127,23 @@ def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
         )
 
 
-def _rig(given: Any) -> Rig | None:
+def _rig(source: Any) -> Rig | None:
     """A rig, or that of a fit; a plant alone has no drive."""
     from upright.rig import Rig
     from upright.verbs.model.fit import FitAnswer
 
-    if isinstance(given, Rig):
-        return given
-    return given.rig if isinstance(given, FitAnswer) else None
+    if isinstance(source, Rig):
+        return source
+    return source.rig if isinstance(source, FitAnswer) else None
 
 
-def _plant(given: Any) -> Plant:
-    plant = given if isinstance(given, Plant) else getattr(given, "plant", None)
+def _plant(source: Any) -> Plant:
+    plant = source if isinstance(source, Plant) else getattr(source, "plant", None)
     if isinstance(plant, Plant):
         return plant
-    if isinstance(given, type) and issubclass(given, Plant):
-        raise BadInput(f"simulate needs a plant with numbers: {given.__name__}({given.names()[0]}=..., ...).")
-    raise BadInput(f"simulate needs a plant, such as up.Pendulum(...), or a fit, got {type(given).__name__}.")
+    if isinstance(source, type) and issubclass(source, Plant):
+        raise BadInput(f"simulate needs a plant with numbers: {source.__name__}({source.names()[0]}=..., ...).")
+    raise BadInput(f"simulate needs a plant, such as up.Pendulum(...), or a fit, got {type(source).__name__}.")
 
 
 def _point(plant: Plant, law: Any, at: str | None) -> dict[str, float]:
@@ -180,7 +180,7 @@ def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
 
 
 def _period(law: Any, dt: float | None) -> float:
-    """Time between samples: the one asked for, or the one that gains or a law are for."""
+    """Time between samples: the requested one, or the one that gains or a law are for."""
     own = (law.period if isinstance(law, Gains | Law | Rule) else None) or None
     if dt is not None and own is not None and not math.isclose(dt, own, rel_tol=1e-6):
         raise BadInput(

@@ -1,4 +1,4 @@
-"""Options that several verbs share, each said and explained once; a verb takes them as ``**on: Unpack[RigOptions]``.
+"""Options that several verbs share, each declared and explained once; verbs take ``**on: Unpack[RigOptions]``.
 
 `cli.build` makes options of the command line of them.
 """
@@ -95,7 +95,7 @@ class DesignOptions(LoopOptions, total=False):
 
 
 def shared_parameters(verb: Parameter, module: str) -> tuple[dict[str, Parameter], dict[str, str]]:
-    """Options that ``**on: Unpack[...]`` of a verb of a module stands for, as parameters, and what is said of each."""
+    """Options that ``**on: Unpack[...]`` of a verb of a module stands for, as parameters, with their texts."""
     named = re.fullmatch(r"(?:\w+\.)?Unpack\[(\w+)\]", str(verb.annotation))
     kind: Any = getattr(sys.modules[module], named[1], None) if named else None
     if not is_typeddict(kind):
@@ -103,14 +103,14 @@ def shared_parameters(verb: Parameter, module: str) -> tuple[dict[str, Parameter
     kin = [k for k in vars(sys.modules[kind.__module__]).values() if is_typeddict(k)]  # 3.11 forgets what a kind is of
     texts = {n: text for k in (*kin, kind) for n, text in parameter_texts(k).items()}
     annotations: dict[str, Any] = kind.__annotations__
-    asked = {
+    shared = {
         name: Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=getattr(a, "__forward_arg__", a))
         for name, a in annotations.items()
     }
-    return asked, texts
+    return shared, texts
 
 
-def known_options(kind: type[Options], given: Mapping[str, Any], verb: str) -> Options:
+def known_options(kind: type[Options], options: Mapping[str, Any], verb: str) -> Options:
     """The options that were given.
 
     Raises
@@ -118,11 +118,11 @@ def known_options(kind: type[Options], given: Mapping[str, Any], verb: str) -> O
     BadInput
         When one is none of this kind.
     """
-    for name in given:
+    for name in options:
         if name not in kind.__annotations__:
             raise BadInput(f"{verb} has no option '{name}'; {nearest(name, kind.__annotations__)}")
-    empty = {n for n, v in given.items() if v is None or (isinstance(v, str | list | tuple | dict) and not v)}
-    return cast("Options", {n: v for n, v in given.items() if n not in empty})
+    empty = {n for n, v in options.items() if v is None or (isinstance(v, str | list | tuple | dict) and not v)}
+    return cast("Options", {n: v for n, v in options.items() if n not in empty})
 
 
 def rig_entries(plant: Plant, unit: str, on: RigOptions) -> dict[str, Entry]:
@@ -139,9 +139,9 @@ def rig_entries(plant: Plant, unit: str, on: RigOptions) -> dict[str, Entry]:
     if every is not None and not 1e-6 <= every <= 10.0:
         raise BadInput(f"a loop is closed every 1e-6 to 10 s, got a period of {every:g} s.")
     far = above_zero(on, "travel", place)
-    said = (("limit", above_zero(on, "limit", unit), unit), ("servo_period", every, "s"), ("travel", far, place))
+    numbers = (("limit", above_zero(on, "limit", unit), unit), ("servo_period", every, "s"), ("travel", far, place))
     options = {"limit": "--limit", "servo_period": "--period", "travel": "--travel"}
-    out = {n: Entry(value=v, unit=u, source=options[n]) for n, v, u in said if v is not None}
+    out = {n: Entry(value=v, unit=u, source=options[n]) for n, v, u in numbers if v is not None}
     units = {c.name: c.unit for c in plant.coordinates}
     for name, number in _counts(on.get("counts"), list(units)).items():
         out[f"counts.{name}"] = Entry(value=number, unit=counts_unit(units[name]), source="--counts")
@@ -158,15 +158,17 @@ def above_zero(on: Mapping[str, Any], name: str, unit: str) -> float | None:
     """
     from upright.units import in_unit
 
-    given = on.get(name)
-    if given is None:
+    value_of_option = on.get(name)
+    if value_of_option is None:
         return None
     try:
-        value = float(given)
+        value = float(value_of_option)
     except (TypeError, ValueError):
-        value = in_unit(str(given), unit)
+        value = in_unit(str(value_of_option), unit)
     if not 0 < value < 1e9:
-        raise BadInput(f'--{name} must be above 0 and below 1e9 {unit}, got {given}; as in --{name} "2 {unit}".')
+        raise BadInput(
+            f'--{name} must be above 0 and below 1e9 {unit}, got {value_of_option}; as in --{name} "2 {unit}".'
+        )
     return value
 
 
@@ -191,7 +193,7 @@ def vendor_of(known: Rig, rig: str, on: RigOptions, source: str) -> str:
 
     make = make_of_rig(known)
     if rig != make.key:
-        raise BadInput(f"{source} is of the make '{make.key}', not '{rig}'; leave --rig out.")
+        raise BadInput(f"{source} is a '{make.key}', not '{rig}'; leave --rig out.")
     return vendor or make.vendor
 
 
@@ -207,11 +209,11 @@ def _counts(counts: Counts | None, names: list[str]) -> dict[str, float]:
         if len(counts) != len(names):
             raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(counts)}.")
         counts = dict(zip(names, counts, strict=True))
-    said = str(counts)
+    text = str(counts)
     if isinstance(counts, Mapping):
-        said = ",".join(f"{name}={value}" for name, value in counts.items())
+        text = ",".join(f"{name}={value}" for name, value in counts.items())
     per: dict[str, float] = {}
-    for piece in said.split(","):
+    for piece in text.split(","):
         name, equals, value = piece.rpartition("=")
         name = name.strip()
         if equals and name not in names:

@@ -58,7 +58,7 @@ def page_folder(out: str | os.PathLike[str] | None, pdf: bool) -> Path:
     Raises
     ------
     BadInput
-        When it is a file, or a PDF is asked for and there is no program to make it.
+        When it is a file, or a PDF is requested and there is no program to make it.
     """
     can_be_pdf(pdf)
     return folder(out or "")
@@ -70,7 +70,7 @@ def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Pa
     Raises
     ------
     BadInput
-        When it is a file, or a PDF is asked for and there is no folder for it or no program to make it.
+        When it is a file, or a PDF is requested and there is no folder for it or no program to make it.
     """
     pdf_has_folder(out, pdf)
     return None if out is None else folder(out)
@@ -82,24 +82,24 @@ def pdf_has_folder(out: str | os.PathLike[str] | None, pdf: bool) -> None:
         raise BadInput("pdf writes into the folder out, and none was named; name one, or call .report('page.pdf').")
 
 
-def can_be_pdf(asked: bool) -> bool:
-    """Whether a PDF is asked for.
+def can_be_pdf(requested: bool) -> bool:
+    """Whether a PDF is requested.
 
     Raises
     ------
     BadInput
         When it is, and cannot be made.
     """
-    if asked:
+    if requested:
         from upright.report.pdf import available
 
         if not available():
             raise BadInput("--pdf needs the pdf extra: pip install 'upright[pdf]', or print the page from a browser.")
-    return asked
+    return requested
 
 
 def write_page(chapter: Chapter, path: Path, pdf: bool) -> list[Path]:
-    """Write a chapter as HTML and, where that is asked for, as PDF beside it; gives back the files."""
+    """Write a chapter as HTML and, where requested, as PDF beside it; gives back the files."""
     from upright.report.html import write_html
     from upright.report.pdf import write_pdf
 

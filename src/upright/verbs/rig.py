@@ -75,7 +75,7 @@ def run(
     check : bool
         Compare a small pulse with the model first.
     watch : bool
-        Look for lying encoders beside the loop, by a bank of Kalman filters.
+        Tell wrong encoders and a weak drive from hands and friction beside the loop.
     accept : str, optional
         Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
         not armed.
@@ -101,14 +101,14 @@ def run(
 
     folder = page_folder(out, pdf)
     leaning = si_if_given(tilt, "rad") or 0.0
-    wish = RunRequest(
+    request = RunRequest(
         rig=Path(rig), law=None if law is None else Path(law), excite=excite, reference=reference, seconds=duration,
         mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
     )  # fmt: skip
-    done = run_rig(wish, folder, watch=observe)
-    told = run_chapter(done)
-    page = write_page(told, done.log_path.with_suffix(".html"), pdf)
-    return Answer(done, told, [*([done.log_path] if done.log is not None else []), *page])
+    result = run_rig(request, folder, watch=observe)
+    written = run_chapter(result)
+    page = write_page(written, result.log_path.with_suffix(".html"), pdf)
+    return Answer(result, written, [*([result.log_path] if result.log is not None else []), *page])
 
 
 @command(
@@ -157,16 +157,16 @@ def rig_check(
     from upright.running.tick import supervised
 
     folder = folder_if_given(out)
-    found = measure(seconds, rate, fifo=fifo, make=supervised)
+    jitter = measure(seconds, rate, fifo=fifo, make=supervised)
     files: list[Path] = []
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         files.append(folder / "jitter.svg")
-        save(jitter_figure(found), files[0])
-    return Answer(found, jitter_chapter(found), files)
+        save(jitter_figure(jitter), files[0])
+    return Answer(jitter, jitter_chapter(jitter), files)
 
 
-def _asked_of_hardware(typed: dict[str, Any]) -> dict[str, Any]:
+def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     from upright.rigs.rigfile import read_rig_file
 
     return typed if read_rig_file(typed["rig"]).hardware else {**typed, "hand": None}
@@ -176,7 +176,7 @@ def _asked_of_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     name="rig doctor",
     metavars={"rig": "RIG.toml"},
     helps={"rig": "What the rig is, and how far it may go."},
-    given=_asked_of_hardware,
+    prepare=_for_hardware,
     wrong=lambda done: not done.chapter.sound,
     more="""
     Let the rig hang freely, with nobody in its way: the pulse moves it.
@@ -202,7 +202,7 @@ def rig_doctor(
     pulse : bool
         Give a small pulse and compare its answer with the model's.
     hand : callable, optional
-        Asked to move a coordinate by hand, with a sentence; answers whether that was done.
+        Called with a sentence, to move a coordinate by hand; answers whether that was done.
 
     Returns
     -------
@@ -218,5 +218,5 @@ def rig_doctor(
     from upright.running.chapter import checkup_chapter
     from upright.running.doctor import check_up
 
-    found = check_up(Path(rig), hand=hand, clear=clear, pulse=pulse)
-    return Answer(found, checkup_chapter(found, typed(Path(rig))))
+    checkup = check_up(Path(rig), hand=hand, clear=clear, pulse=pulse)
+    return Answer(checkup, checkup_chapter(checkup, typed(Path(rig))))

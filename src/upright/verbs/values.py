@@ -46,8 +46,10 @@ if TYPE_CHECKING:
     """A log: its file, a record, or a data frame."""
 
 
-def open_log(log: Log, reader: str = "") -> tuple[Record, Path]:
+def open_log(log: Log, reader: str = "", time_unit: str = "") -> tuple[Record, Path]:
     """Record of a log and the path that it is called by; ``log`` for one that comes from no file.
+
+    A `time_unit` is that of a time column which states none.
 
     Raises
     ------
@@ -56,9 +58,10 @@ def open_log(log: Log, reader: str = "") -> tuple[Record, Path]:
     """
     if isinstance(log, str | os.PathLike):
         from upright.readers import read
+        from upright.study.clock import with_time_unit
 
         path = Path(log)
-        return read(path, reader=reader or None), path
+        return with_time_unit(read(path, reader=reader or None), time_unit), path
     from upright.records import Record
 
     if not isinstance(log, Record):
@@ -101,7 +104,7 @@ Start = str | Mapping[str, float | str]
 """Deviation by state, `read_start`."""
 
 
-def read_start(given: Start | None, states: Sequence[str], units: Sequence[str]) -> dict[str, float]:
+def read_start(start: Start | None, states: Sequence[str], units: Sequence[str]) -> dict[str, float]:
     """Deviation from an equilibrium by state: ``{"theta": "5 deg"}``, ``"theta=5 deg, theta_dot=1 rad/s"``.
 
     A value alone is of the last coordinate, whose state comes before the last.
@@ -113,18 +116,18 @@ def read_start(given: Start | None, states: Sequence[str], units: Sequence[str])
     """
     from upright.units import scale
 
-    if not given:
+    if not start:
         return {}
-    if isinstance(given, str):
-        pieces = [piece.rpartition("=") for piece in given.split(",") if piece.strip()]
-        said: dict[str, float | str] = {(name.strip() or states[-2]): value for name, _, value in pieces}
+    if isinstance(start, str):
+        pieces = [piece.rpartition("=") for piece in start.split(",") if piece.strip()]
+        values: dict[str, float | str] = {(name.strip() or states[-2]): value for name, _, value in pieces}
     else:
-        said = dict(given)
+        values = dict(start)
     unit = dict(zip(states, units, strict=True))
-    for name in said:
+    for name in values:
         if name not in unit:
             raise BadInput(f"--start names states as in \"theta=5 deg\", got '{name}'; {nearest(name, states)}")
-    return {n: si(v, unit[n]) / (scale(unit[n]) if isinstance(v, str) else 1.0) for n, v in said.items()}
+    return {n: si(v, unit[n]) / (scale(unit[n]) if isinstance(v, str) else 1.0) for n, v in values.items()}
 
 
 def read_pole_list(value: str | Iterable[complex] | None) -> NDArray[np.complex128] | None:
@@ -135,8 +138,8 @@ def read_pole_list(value: str | Iterable[complex] | None) -> NDArray[np.complex1
         return read_poles(value) if value else None
     import numpy as np
 
-    asked = np.atleast_1d(np.asarray(value, dtype=np.complex128)).ravel()
-    return asked if asked.size else None
+    poles = np.atleast_1d(np.asarray(value, dtype=np.complex128)).ravel()
+    return poles if poles.size else None
 
 
 def pairs(value: Mapping[str, T] | Sequence[str] | str | None, option: str) -> dict[str, T | str]:
@@ -151,10 +154,10 @@ def pairs(value: Mapping[str, T] | Sequence[str] | str | None, option: str) -> d
         return dict(value)
     out: dict[str, T | str] = {}
     for text in texts(value):
-        name, equals, said = text.partition("=")
-        if not equals or not name.strip() or not said.strip():
+        name, equals, content = text.partition("=")
+        if not equals or not name.strip() or not content.strip():
             raise BadInput(f"{option} takes NAME=VALUE, got '{text}'.")
-        out[name.strip()] = said.strip()
+        out[name.strip()] = content.strip()
     return out
 
 

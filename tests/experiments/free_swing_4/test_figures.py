@@ -84,7 +84,7 @@ def test_the_chapter_s_table_of_drift_is_in_degrees_or_centimetres(make, rows, u
     ways = (*PATHS, path("pushed, spring", 0.0, True), path("out of level", 0.0, False),
             path("out of level, spring", 0.0, True))  # fmt: skip
     t = np.linspace(0, 1, 11)
-    energy = EnergyBalance(t=t, stored=0.02 - 0.01 * t, taken={"viscous friction": 0.0123 * t})
+    energy = EnergyBalance(t=t, stored=0.02 - 0.01 * t, dissipated={"viscous friction": 0.0123 * t})
     done = FreeSwing(rig=freed(make_rig(make)), folder=tmp_path, drifts=ways, balance=energy)
     told = chapter(done)
     assert [part.title for part in told.parts][1:] == [

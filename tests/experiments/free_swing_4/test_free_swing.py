@@ -31,7 +31,7 @@ def fits(answer, role):
 
 def test_the_free_swing_is_found_from_guesses_30_percent_off(done):
     answer = done.answers["free_swing"]
-    for name, guess in answer.question.asked.items():
+    for name, guess in answer.question.guesses.items():
         assert abs(guess / getattr(done.rig.plant, name) - 1) == pytest.approx(0.3)
     assert answer.fit.trusted
     # half a count of 16000 is all that an ideal model cannot explain of swings of 0.3 and 1.5 rad
@@ -83,7 +83,7 @@ def test_with_the_spring_a_level_model_will_do(done):
 
 def test_energy_is_shared_out_without_remainder(done):
     b = done.balance
-    total = b.stored + sum(b.taken.values())
+    total = b.stored + sum(b.dissipated.values())
     assert total == pytest.approx(b.stored[0], rel=1e-4)
 
 
@@ -114,7 +114,7 @@ def test_the_studies_can_be_identified_again(done):
 
     for question in questions(done.rig):
         study = load_study(done.folder / f"{question.name}.toml")
-        assert set(study.model.estimated) == set(question.asked)
+        assert set(study.model.estimated) == set(question.guesses)
 
 
 def test_an_interrupted_experiment_keeps_and_tells_what_is_there(tmp_path):

@@ -82,14 +82,14 @@ def test_guesses_are_30_percent_off_and_without_an_inertia_it_is_asked_as_well(r
     assert list(asked) == ["free_swing", "no_scale", *(("level_model", "tilt_model", "spring") if rig is DISK else ())]
     for q in asked.values():
         for name in ("m_p", "J_p", *FRICTION):
-            assert abs(q.asked[name] / truth[name] - 1) == pytest.approx(0.3)
-        assert not q.asked.keys() & q.known.keys()
+            assert abs(q.guesses[name] / truth[name] - 1) == pytest.approx(0.3)
+        assert not q.guesses.keys() & q.known.keys()
     blind, seen = asked["no_scale"], asked["free_swing"]
     inertias = {"J_d", "J_a"} if rig is DISK else {"m_c"}
-    assert blind.asked.keys() - seen.asked.keys() == inertias
+    assert blind.guesses.keys() - seen.guesses.keys() == inertias
     assert seen.known.keys() - blind.known.keys() == inertias
     for name in inertias:
-        assert abs(blind.asked[name] / seen.known[name][0] - 1) == pytest.approx(0.3)
+        assert abs(blind.guesses[name] / seen.known[name][0] - 1) == pytest.approx(0.3)
     assert (seen.fitted, seen.predicted) == ("release_90.csv", "release_60.csv")
 
 
@@ -98,10 +98,10 @@ def test_a_leaning_rig_is_asked_three_times():
     level, tilt, spring = questions(DISK)[2:]
     assert [q.fitted for q in (level, tilt, spring)] == [TILTED[0], TILTED[0], TILTED[2]]
     assert [q.predicted for q in (level, tilt, spring)] == [TILTED[1], TILTED[1], TILTED[3]]
-    assert (tilt.asked["tilt_x"], tilt.asked["tilt_y"]) == (0.0, 0.0)
+    assert (tilt.guesses["tilt_x"], tilt.guesses["tilt_y"]) == (0.0, 0.0)
     assert tilt.bounds == {"tilt_x": (-0.1, 0.1), "tilt_y": (-0.1, 0.1)}
     assert level.bounds == spring.bounds == {}
-    assert "tilt_y" not in level.asked
+    assert "tilt_y" not in level.guesses
     anchor = MAKES["furuta"].anchor
     assert spring.known["k_psi"] == (anchor, 0.01 * anchor)
     assert (level.method, tilt.method, spring.method) == ("least-squares", "auto", "least-squares")
@@ -119,7 +119,7 @@ def test_studies_say_to_their_digits_what_was_asked(rig, tmp_path):
             assert numbers[name].value == pytest.approx(value, rel=1e-5)
             assert (numbers[name].uncertainty or 0.0) == pytest.approx(spread, rel=1e-5)
             assert not numbers[name].estimate
-        for name, guess in q.asked.items():
+        for name, guess in q.guesses.items():
             assert numbers[name].estimate
             assert numbers[name].value == pytest.approx(guess, rel=1e-5)
             assert study.model.bounds(name) == q.bounds.get(name, (0.0, math.inf))
@@ -157,6 +157,6 @@ def test_the_balance_is_that_of_the_fitted_plant_over_twelve_seconds():
     assert b.t[0] == 0.0
     assert b.t[1] == pytest.approx(0.02, abs=SERVO)
     assert b.t[-1] == pytest.approx(12.0, abs=0.03)
-    total = b.stored + sum(b.taken.values())
+    total = b.stored + sum(b.dissipated.values())
     assert total == pytest.approx(b.stored[0], rel=1e-4)
-    assert set(b.taken) == {"viscous friction", "Coulomb friction of psi", "Coulomb friction of theta"}
+    assert set(b.dissipated) == {"viscous friction", "Coulomb friction of psi", "Coulomb friction of theta"}

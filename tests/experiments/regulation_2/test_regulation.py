@@ -48,7 +48,9 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
 def test_two_sets_regulate_and_one_does_not_as_the_paper_saw_and_as_was_told(make, tmp_path):
     """The paper, section 4.2: typically at least two sets regulate, at least one saturates or has too little effort."""
     truth = make_rig(make)
-    done = run_regulation(completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, wish=RegulationRequest(draws=64))
+    done = run_regulation(
+        completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, request=RegulationRequest(draws=64)
+    )
     words = [a.word for a in done.attempts]
     assert words.count("stabilised") >= 2
     assert {"stabilised with saturation", "does not settle", "leaves its travel"} & set(words)
@@ -71,7 +73,7 @@ def attempt(stabilised, saturated=0.0, busy=0.0, rest_rms=0.0, push=1.0):
         "stabilised with excessive effort": busy,
     }
     return SimpleNamespace(before=SimpleNamespace(
-        words=words, quiet_chance=stabilised + saturated, chance=stabilised + saturated + busy, rest_rms=rest_rms,
+        words=words, quiet_share=stabilised + saturated, share=stabilised + saturated + busy, rest_rms=rest_rms,
         push=push,
     ))  # fmt: skip
 
@@ -89,7 +91,7 @@ def attempt(stabilised, saturated=0.0, busy=0.0, rest_rms=0.0, push=1.0):
 def test_of_sets_equally_sure_the_quieter_one_is_used(better, worse):
     for order in ((better, worse), (worse, better)):
         done = Regulation(
-            rig=None, truth=None, task=None, wish=None, attempts=order, ways=(), uncertain=True, source="", seed=0
+            rig=None, truth=None, task=None, request=None, attempts=order, ways=(), uncertain=True, source="", seed=0
         )  # fmt: skip
         assert done.best is better
 
@@ -101,15 +103,15 @@ def test_coarse_encoders_make_the_verdict_name_the_command_at_rest(tmp_path):
     known = completed(fit_of(make_rig("furuta"))).replace(counts=(1_000, 1_000))
     poles = {"set 2": RegulationRequest().poles["set 2"]}
     wish = RegulationRequest(poles=poles, draws=32, speed="plain")
-    done = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, wish=wish)
+    done = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, request=wish)
     told = regulation_page.chapter(done)
     assert done.best.before.chance == 1.0
     assert done.best.before.word == "stabilised with excessive effort"
     assert not told.sound
     assert "No pole set is recommended" in told.verdict
     assert "The command at rest has an rms of" in told.verdict
-    calm = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, wish=replace(wish, speed="kalman"))
-    assert calm.best.before.quiet_chance == 1.0
+    calm = run_regulation(known, TwinStand(rig=truth), 0, tmp_path, request=replace(wish, speed="kalman"))
+    assert calm.best.before.quiet_share == 1.0
     assert "The command at rest" not in regulation_page.chapter(calm).verdict
 
 
@@ -118,7 +120,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
 
     truth = make_rig("linear")
     wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
-    done = run_regulation(completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, wish=wish)
+    done = run_regulation(completed(fit_of(truth)), TwinStand(rig=truth), 0, tmp_path, request=wish)
     log = Record.from_csv(tmp_path / "regulation_set_2.csv")
     run = done.attempts[0].after
     counts = log["theta"] * truth.per_unit[1]
@@ -128,7 +130,7 @@ def test_the_log_of_a_run_is_what_the_encoders_show(tmp_path):
 
 def test_without_a_rig_nothing_is_run(tmp_path):
     wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=16, seconds=1.0)
-    done = run_regulation(completed(fit_of(make_rig("linear"), spread=0.0)), None, 0, tmp_path, wish=wish)
+    done = run_regulation(completed(fit_of(make_rig("linear"), spread=0.0)), None, 0, tmp_path, request=wish)
     told = regulation_page.chapter(done)
     assert "Nothing was run" in told.verdict
     assert "states no uncertainty" in told.detail
@@ -141,7 +143,7 @@ def predicted(tmp_path_factory):
     poles = {"set 2": RegulationRequest().poles["set 2"]}
     wish = RegulationRequest(poles=poles, draws=4, seconds=1.0, tilt=math.pi / 20, push=0.25)
     known = fit_of(make_rig("linear"), spread=0.0)
-    return run_regulation(completed(known), None, 0, tmp_path_factory.mktemp("regulation"), wish=wish)
+    return run_regulation(completed(known), None, 0, tmp_path_factory.mktemp("regulation"), request=wish)
 
 
 def test_a_way_to_the_velocities_that_holds_the_rig_has_margins(predicted):

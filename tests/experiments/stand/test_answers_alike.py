@@ -12,7 +12,7 @@ from upright.experiments.stand.live import live_stand, pushed, run_of
 from upright.experiments.stand.stand import APPLIED, file_of
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.tracking_3.laws import AT, paper_sets
-from upright.experiments.tracking_3.run import asked_of, figured
+from upright.experiments.tracking_3.run import figured, levels_of
 from upright.files import write_json
 from upright.laws import as_values
 from upright.readers import read
@@ -46,7 +46,7 @@ def test_a_step_and_the_push_after_it_come_alike(stands, tmp_path):
     rig = make_rig("torsional")
     law = paper_sets(rig, (1,))[0]
     size = 0.9 * rig.limit / abs(law.k_pf)
-    reference, pushes = asked_of(rig, size)
+    reference, pushes = levels_of(rig, size)
     n = reference.size
     simulated = stands[0].hold(
         law.law, AT, tmp_path, "step", (n - 1) * rig.period, reference=reference, pushes=pushes

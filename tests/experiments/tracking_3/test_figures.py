@@ -174,14 +174,14 @@ def test_poles_are_those_of_rig_model_and_request_in_the_upper_half_plane():
     for ax, law in zip(drawing.axes, (SET_1, SET_4, SUM), strict=False):
         by_name = {line.get_label(): line for line in ax.get_lines()}
         np.testing.assert_allclose(points(by_name["open loop"]), upper(RIG.linear(AT).poles()), atol=1e-9)
-        np.testing.assert_allclose(points(by_name["asked"]), upper(law.asked))
+        np.testing.assert_allclose(points(by_name["requested"]), upper(law.requested))
         np.testing.assert_allclose(points(by_name["on the fitted model, sampled and late"]), upper(law.poles))
         np.testing.assert_allclose(points(by_name["on the rig"]), upper(loop_poles(other, law.law)))
-        assert ax.get_xlim()[0] == pytest.approx(1.12 * SET_4.asked.real.min())
+        assert ax.get_xlim()[0] == pytest.approx(1.12 * SET_4.requested.real.min())
         assert ax.get_xlim()[1] == pytest.approx(-0.06 * ax.get_xlim()[0])
-        high = 1.2 * max(np.abs(p.imag).max() for p in (RIG.linear(AT).poles(), SET_1.asked, SET_4.asked))
+        high = 1.2 * max(np.abs(p.imag).max() for p in (RIG.linear(AT).poles(), SET_1.requested, SET_4.requested))
         assert ax.get_ylim() == pytest.approx((-0.08 * high, high))
-        beyond = int(np.sum(upper(loop_poles(other, law.law)).real < 1.12 * SET_4.asked.real.min()))
+        beyond = int(np.sum(upper(loop_poles(other, law.law)).real < 1.12 * SET_4.requested.real.min()))
         assert ax.get_title(loc="left") == law.name + (f" ({beyond} faster left out)" if beyond else "")
     one = poles_figure(tracking(outcome(SET_1)))
     assert len(one.axes) == 1

@@ -13,7 +13,7 @@ from upright.control import trial
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
-from upright.experiments.tracking_3.run import RESERVE, asked_of, attempt, choose_step, run_tracking
+from upright.experiments.tracking_3.run import RESERVE, attempt, choose_step, levels_of, run_tracking
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
 from upright.gains.loop import swing
@@ -25,7 +25,6 @@ from upright.study.load import load_study
 FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
 
 
-@pytest.mark.slow
 def test_the_far_body_ends_at_the_reference_without_friction():
     """Final value theorem: k_pf makes the static gain one, whatever poles, seed and encoders."""
     for kind in SHAFTS:
@@ -115,14 +114,15 @@ def test_the_loop_is_linear_in_the_gains():
     np.testing.assert_allclose(A + 3.0 * P + 0.4 * D, closed_by(rig, law), rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", SHAFTS)
 def test_a_sum_makes_up_for_a_push_and_follows_the_step_as_before(kind):
     rig = make_rig(kind, 2).changed(**FRICTIONLESS)
     model = rig.linear(AT)
     base = paper_sets(rig, (4,))[0]
     law = with_sum(rig, base, "")
-    assert law.k_pf == pytest.approx(prefilter(model.A, model.B, model.C[-1], place(model.A, model.B, base.asked).K))
+    assert law.k_pf == pytest.approx(
+        prefilter(model.A, model.B, model.C[-1], place(model.A, model.B, base.requested).K)
+    )
     step, pushes = 0.4 * rig.limit / law.k_pf, np.full(9000, 0.1 * rig.limit)
     ends = [
         trial(rig, one.law, at=AT, start=np.zeros(4), seconds=3.0, reference=np.full(1, step), pushes=pushes).x[-1, 2]
@@ -147,7 +147,6 @@ def test_a_law_begins_where_the_rig_rests_without_a_jump(kind, summed):
     np.testing.assert_allclose(np.diff(u, axis=0), growth, atol=1e-9 * abs(law.K[::2] @ q))
 
 
-@pytest.mark.slow
 def test_disks_move_as_carts_do_in_other_units():
     """m - J, k - k_t, c - c_t, F - T: with factors that are powers of two even the rounding is the same."""
     carts = make_rig("rectilinear", 5)
@@ -191,7 +190,7 @@ def test_a_step_is_followed_by_a_push_of_a_tenth_of_the_drive_s_limit_against_it
     """0.1 s of rest, 2 s of the step alone, 1.5 s of step and push; the rig's own limit, whatever its unit."""
     rig = make_rig(kind)
     for limit in (rig.limit, 3 * rig.limit):
-        reference, pushes = asked_of(rig.replace(limit=limit), 0.02)
+        reference, pushes = levels_of(rig.replace(limit=limit), 0.02)
         t = np.arange(reference.size) * rig.period
         assert t[-1] == pytest.approx(3.6, abs=rig.period)
         half = rig.period / 2  # steps come at the nearest tick
@@ -206,7 +205,7 @@ def test_pulses_stay_within_travel_and_twist():
             for file in ("pulses.csv", "others.csv"):
                 q = pulses(rig, file).y * rig.resolution
                 assert np.abs(q).max() < rig.travel
-                assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].twist
+                assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].rig.twist
 
 
 @pytest.mark.slow
@@ -256,7 +255,6 @@ def test_the_loop_does_not_depend_on_the_scale_of_the_inertias(tmp_path, scale):
     assert found.k_pf == pytest.approx(true.k_pf, rel=5e-3)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", SHAFTS)
 def test_no_pd_of_a_hundred_others_arrives_sooner_by_more_than_the_grid(kind):
     """The search's last grid has steps of 6 %; random pairs may beat it by little."""

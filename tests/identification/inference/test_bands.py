@@ -184,7 +184,7 @@ def test_the_promise_is_kept_when_enough_lies_inside() -> None:
     """An error that grows from 0 to 1 is inside a band of 0.4 for 41 of 101 samples, and of 0.8 for 81."""
     bands = Bands(quantile=1.0, spreads={})
     short, kept = (promise({"r": scored(1.0, half)}, bands) for half in (0.4, 0.8))
-    assert (short.kept, kept.kept) == (False, True)
+    assert (short.holds, kept.holds) == (False, True)
     assert "r theta 41 %" in short.sentence
     assert "80 %" in kept.sentence
     late = replace(scored(1.0, 0.4), score_from=0.5)
@@ -194,7 +194,7 @@ def test_the_promise_is_kept_when_enough_lies_inside() -> None:
 def test_a_prediction_that_no_band_measures_is_not_kept() -> None:
     """At a fit of 50 % with no band of its signal nothing was compared, which is no success."""
     untested = promise({"r": scored(1.0, 0.0)}, Bands(quantile=1.0, spreads={}))
-    assert not untested.kept
+    assert not untested.holds
     assert "Nothing tells" in untested.sentence
     assert "theta of r" in untested.sentence
 
@@ -202,9 +202,9 @@ def test_a_prediction_that_no_band_measures_is_not_kept() -> None:
 def test_without_bands_the_fitted_runs_are_the_measure() -> None:
     """A signal at 50 % falls short of runs fitted to 95 %, and not of runs fitted to 60 %."""
     runs = {"r": scored(1.0, 0.0)}
-    assert not promise(runs, None, {"one": {"theta": 95.0}}).kept
+    assert not promise(runs, None, {"one": {"theta": 95.0}}).holds
     kept = promise(runs, None, {"one": {"theta": 60.0}})
-    assert kept.kept
+    assert kept.holds
     assert "no bands" in kept.sentence
 
 

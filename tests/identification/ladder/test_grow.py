@@ -141,7 +141,7 @@ def test_friction_of_each_run_is_offered_only_where_there_are_runs_and_friction(
 
 
 @pytest.mark.parametrize(
-    ("asked_of", "offered"),
+    ("levels_of", "offered"),
     [
         (({}, {}), True),
         (({"unknown": ("friction",)}, {}), False),  # said of one run: it was thought of
@@ -151,8 +151,8 @@ def test_friction_of_each_run_is_offered_only_where_there_are_runs_and_friction(
         (({}, {}, {"role": "predict", "unknown": ("friction",)}), True),
     ],
 )
-def test_friction_of_each_run_is_offered_where_no_fitted_run_speaks_of_it(asked_of, offered):
-    runs = [replace(run, **about) for run, about in zip(PLAIN, asked_of, strict=False)]
+def test_friction_of_each_run_is_offered_where_no_fitted_run_speaks_of_it(levels_of, offered):
+    runs = [replace(run, **about) for run, about in zip(PLAIN, levels_of, strict=False)]
     assert ("friction of each run" in [r.name for r in default_rungs(asked(), runs)]) is offered
 
 

@@ -49,7 +49,7 @@ def test_samples_that_a_fit_left_out_do_not_count() -> None:
     e = np.where(np.arange(4000) % 20 < 10, 0.0, SIGMA) * np.random.default_rng(2).normal(size=4000)
     problem, spread = missed(e, None)
     kept = np.arange(4000) % 20 >= 10
-    problem.tracks = [replace(problem.tracks[0], kept=kept)]
+    problem.tracks = [replace(problem.tracks[0], retained=kept)]
     assert noise_level(problem, problem.start) == pytest.approx(SIGMA / spread, rel=0.1)
 
 

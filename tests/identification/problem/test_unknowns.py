@@ -66,7 +66,7 @@ def test_a_number_is_sought_in_the_coordinate_that_suits_it(
     u = sought(name, **fields)
     value = min(max(fields.get("value", 4.0), lower), upper)
     assert (u.log, u.lower, u.upper, u.scale) == (log, pytest.approx(lower), pytest.approx(upper), scale)
-    assert (u.value, u.asked, u.prior, u.shared, u.group) == (value, True, None, True, "")
+    assert (u.value, u.estimated, u.prior, u.shared, u.group) == (value, True, None, True, "")
     assert u.coordinate(u.value) == pytest.approx(math.log(value) if log else value)
     ends = (math.log(lower), math.log(upper)) if log else (lower, upper)
     assert u.bounds == pytest.approx(ends)
@@ -74,9 +74,9 @@ def test_a_number_is_sought_in_the_coordinate_that_suits_it(
 
 def test_what_is_known_within_a_tolerance_is_sought_but_not_asked() -> None:
     mass = sought("m_1", estimate=False, uncertainty=0.2)
-    assert (mass.asked, mass.prior) == (False, (pytest.approx(math.log(4.0)), pytest.approx(0.05)))
+    assert (mass.estimated, mass.prior) == (False, (pytest.approx(math.log(4.0)), pytest.approx(0.05)))
     spring = sought("k_1", estimate=False, uncertainty=0.2)
-    assert (spring.asked, spring.prior, spring.scale) == (False, (4.0, 0.2), 4.0)
+    assert (spring.estimated, spring.prior, spring.scale) == (False, (4.0, 0.2), 4.0)
     none = sought("c_1", estimate=False, uncertainty=0.2, value=0.0)
     assert (none.prior, none.scale) == ((0.0, 0.2), 0.2)
     known = {n: Parameter(name=n, value=v) for n, v in VALUES.items()}
@@ -225,7 +225,7 @@ def test_runs_of_one_group_share_one_number_that_a_prediction_is_given() -> None
     assert [(u.name, u.group, u.runs) for u in problem.unknowns] == [("friction", "x", (0, 2)), ("friction", "y", (1,))]
     assert [problem.key(i) for i in range(2)] == ["group x: friction", "group y: friction"]
     assert [problem.sought_in(i).tolist() for i in range(3)] == [[0], [1], [0]]
-    given = formulate(rig_, runs[:1], given={"x": {"friction": 1.3}, "y": {"friction": 9.0}})
+    given = formulate(rig_, runs[:1], stated={"x": {"friction": 1.3}, "y": {"friction": 9.0}})
     assert [(u.value, u.lower, u.upper) for u in given.unknowns] == [(1.3, 1.3, 1.3)]
 
 
@@ -343,14 +343,14 @@ def test_every_third_of_nine_blocks_judges_the_others(fold: int) -> None:
     judges, rest = prepare(asked, run, thin=False).hidden(fold)
     expected = [(100 * (fold + 3 * k), 100 * (fold + 3 * k + 1)) for k in range(3)]
     assert np.flatnonzero(judges).tolist() == [i for a, b in expected for i in range(a, b)]
-    assert rest.kept is not None
-    assert np.array_equal(rest.kept, ~judges)
+    assert rest.retained is not None
+    assert np.array_equal(rest.retained, ~judges)
     windows, fewer = prepare(asked, replace(run, horizon=0.1), thin=False).hidden(fold)
     assert (windows.sum(), windows.size) == (fewer.restarts.size and windows.size - fewer.restarts.size, 89)
     assert len(fewer.x0) == len(fewer.variance) == fewer.restarts.size
     short, same = prepare(asked, run.samples(slice(199)), thin=False).hidden(fold)
     assert not short.any()
-    assert same.kept is None
+    assert same.retained is None
     assert prepare(asked, run.samples(slice(200)), thin=False).hidden(fold)[0].any()
 
 

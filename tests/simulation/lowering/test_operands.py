@@ -82,3 +82,11 @@ def test_a_tuple_has_lanes_where_one_of_its_items_has() -> None:
     assert not has_lanes(TupleOf((INT, TupleOf((FLOAT, ArrayOf(1))))))
     assert has_lanes(TupleOf((INT, TupleOf((FLOAT, INTS)))))
     assert llvm(TupleOf((FLOAT, TupleOf((FLOATS, ArrayOf(2))))), 8) == "{double, {<8 x double>, ptr}}"
+
+
+def test_whole_numbers_are_those_of_64_bits():
+    for x in (-(2**63), -1, 0, 2**63 - 1):
+        assert (whole(x).text, whole(x).const) == (str(x), x)
+    for x in (-(2**63) - 1, 2**63):
+        with pytest.raises(Unsupported, match="64 bits"):
+            whole(x)

@@ -302,7 +302,7 @@ def test_a_plant_of_the_user_s_own_starts_from_sizes_that_swing_as_slowly():
                        window=(0.0, 9.0), frequency=w, settled=True, doubts=())  # fmt: skip
     starts = starts_hanging(found, Spring)
     mass, _ = starts.assumed["m_p"]
-    asked = starts.asked
+    asked = starts.guesses
     assert mass == 1.0
     assert G / asked["l_cg"] == pytest.approx(w**2)
     assert asked["J_p"] == pytest.approx(mass * asked["l_cg"] ** 2)

@@ -1,4 +1,4 @@
-"""Experiment 4 as a chapter: what the swing told, what it cannot know, and why disk or cart wander."""
+"""Experiment 4 as a chapter: what the swing shows, what it cannot know, and why disk or cart wander."""
 
 from __future__ import annotations
 
@@ -25,73 +25,75 @@ QUESTION = (
 _TILTED = ("level_model", "tilt_model", "spring")
 
 
-def chapter(done: FreeSwing) -> Chapter:
+def chapter(result: FreeSwing) -> Chapter:
     """The experiment, however far it came."""
-    fit = done.answers["free_swing"].fit if "free_swing" in done.answers else None
-    found = recovered(done.rig, fit) if fit else ()
-    parts = [Part("Data: the releases", _data(done))]
+    fit = result.answers["free_swing"].fit if "free_swing" in result.answers else None
+    estimates = recovered(result.rig, fit) if fit else ()
+    parts = [Part("Data: the releases", _data(result))]
     if fit:
         followed = (score_table(fit.runs), *run_pictures(fit, "swing"))
-        parts += [motion_part(fit), Part("Fit: large free swing", followed), _parameters(done, fit)]
-    if "no_scale" in done.answers:
-        parts.append(_blind_part(done.answers["no_scale"].fit))
-    if done.balance:
-        parts.append(_energy_part(done.balance))
-    if done.drifts:
-        parts.append(_drift_part(done))
-    if done.answers.keys() & set(_TILTED):
-        parts.append(_level_part(done))
+        parts += [motion_part(fit), Part("Fit: large free swing", followed), _parameters(result, fit)]
+    if "no_scale" in result.answers:
+        parts.append(_blind_part(result.answers["no_scale"].fit))
+    if result.balance:
+        parts.append(_energy_part(result.balance))
+    if result.drifts:
+        parts.append(_drift_part(result))
+    if result.answers.keys() & set(_TILTED):
+        parts.append(_level_part(result))
     return Chapter(
         key="4",
         title="Large free swing",
-        question=QUESTION.format(body=done.body),
-        verdict=_verdict(done),
-        detail=_detail(done),
-        sound=bool(fit and fit.trusted and not done.interrupted),
+        question=QUESTION.format(body=result.body),
+        verdict=_verdict(result),
+        detail=_detail(result),
+        sound=bool(fit and fit.trusted and not result.interrupted),
         parts=tuple(parts),
-        steps=_steps(done),
+        steps=_steps(result),
         findings=tuple(
-            finding(Symbol(f"{f.name} [{unit(f.unit)}]"), fit.estimates[f.name], f.truth) for f in found
+            finding(Symbol(f"{f.name} [{unit(f.unit)}]"), fit.estimates[f.name], f.truth) for f in estimates
         ) if fit else (),
-        numbers=_numbers(done),
+        numbers=_numbers(result),
     )  # fmt: skip
 
 
-def _verdict(done: FreeSwing) -> str:
+def _verdict(result: FreeSwing) -> str:
     """What the fit showed, in a sentence."""
-    if "free_swing" not in done.answers:
+    if "free_swing" not in result.answers:
         return "The experiment was stopped before the first fit."
-    fit = done.answers["free_swing"].fit
-    found = recovered(done.rig, fit)
-    inside = sum(f.inside for f in found)
-    return f"{inside} of {len(found)} numbers of the rig lie in their 95 % interval; {_followed(fit)}."
+    fit = result.answers["free_swing"].fit
+    estimates = recovered(result.rig, fit)
+    inside = sum(f.inside for f in estimates)
+    return f"{inside} of {len(estimates)} numbers of the rig lie in their 95 % interval; {_followed(fit)}."
 
 
-def _detail(done: FreeSwing) -> str:
+def _detail(result: FreeSwing) -> str:
     """What else the experiment showed, as far as it came."""
-    said = "Interrupted: this is what was there by then." if done.interrupted else ""
-    if "no_scale" in done.answers:
-        unseen = done.answers["no_scale"].fit.unseen
-        said += " Without a known inertia the same data fix only ratios" + (", and the fit says so." if unseen else ".")
-    if {"level_model", "tilt_model"} <= done.answers.keys():
-        level, tilt = (_worst_fitted(done.answers[n].fit) for n in ("level_model", "tilt_model"))
-        said += (
+    text = "Interrupted: this is what was there by then." if result.interrupted else ""
+    if "no_scale" in result.answers:
+        unseen = result.answers["no_scale"].fit.unseen
+        text += " Without a known inertia the same data fix only ratios" + (", and the fit says so." if unseen else ".")
+    if {"level_model", "tilt_model"} <= result.answers.keys():
+        level, tilt = (_worst_fitted(result.answers[n].fit) for n in ("level_model", "tilt_model"))
+        text += (
             f" {math.degrees(TILT):g}° out of level, a level model cannot follow the disk (fit {percent(level)}),"
             f" one that may lean can ({percent(tilt)})."
         )
-    if done.drifts and done.body == "disk":
-        free, held = (next(w for w in done.drifts if "out of level" in w.name and w.remedy == r) for r in (False, True))
-        said += (
+    if result.drifts and result.body == "disk":
+        free, held = (
+            next(w for w in result.drifts if "out of level" in w.name and w.remedy == r) for r in (False, True)
+        )
+        text += (
             f" That lean drags the free disk away by {math.degrees(abs(free.end)):.0f}°;"
             f" a soft spring keeps it within {math.degrees(abs(held.end)):.0f}°."
         )
-    elif done.drifts:
-        free, held = (next(w for w in done.drifts if "pushed" in w.name and w.remedy == r) for r in (False, True))
-        said += (
-            f" A push of {done.make.push:g} m/s at the release leaves the cart {100 * abs(free.end):.1f} cm away,"
+    elif result.drifts:
+        free, held = (next(w for w in result.drifts if "pushed" in w.name and w.remedy == r) for r in (False, True))
+        text += (
+            f" A push of {result.make.push:g} m/s at the release leaves the cart {100 * abs(free.end):.1f} cm away,"
             f" where dry friction holds it; a soft spring brings it back to {100 * abs(held.end):.1f} cm."
         )
-    return said.strip()
+    return text.strip()
 
 
 def _followed(fit: Fit) -> str:
@@ -107,15 +109,17 @@ def _worst_fitted(fit: Fit) -> float:
     return min(v for s in fit.runs.values() if s.role == "fit" for v in s.fit_percent.values())
 
 
-def _data(done: FreeSwing) -> tuple[str, ...]:
-    rig = done.rig
+def _data(result: FreeSwing) -> tuple[str, ...]:
+    rig = result.rig
     pole = number(float(rig.plant.linear("inverted").poles().real.max()), 4)
     drive = (
         "drive belt off, so that the disk turns on its own bearings"
-        if done.body == "disk"
+        if result.body == "disk"
         else "motor silent, pulled along by the cart"
     )
-    body = f"the {done.body}'s inertia from experiment 1a" if done.weighed else f"the {done.body}'s inertia to 1 %"
+    body = (
+        f"the {result.body}'s inertia from experiment 1a" if result.weighed else f"the {result.body}'s inertia to 1 %"
+    )
     return (
         f"A digital twin of {rig.name}, seed {rig.seed}: no rig was touched. Nothing is published about the A51, so "
         f"its rod and weight are plausible brass parts; {drive}. Encoders of 16 000 counts per turn, logged every "
@@ -125,9 +129,9 @@ def _data(done: FreeSwing) -> tuple[str, ...]:
     )
 
 
-def _parameters(done: FreeSwing, fit: Fit) -> Part:
+def _parameters(result: FreeSwing, fit: Fit) -> Part:
     """Numbers of the rig beside the truth of the twin."""
-    truth = done.rig.plant.parameters()
+    truth = result.rig.plant.parameters()
     table = parameter_table(
         fit, truth=truth,
         caption="Estimated and given numbers of the rig, beside the truth of the twin",
@@ -142,13 +146,13 @@ def _parameters(done: FreeSwing, fit: Fit) -> Part:
 
 def _blind_part(blind: Fit) -> Part:
     """What the same swing cannot tell without a known inertia."""
-    told: list[Block] = [
+    blocks: list[Block] = [
         "Multiply every mass, inertia and friction by the same factor and nothing moves differently: gravity pulls "
         "more, inertia resists more. A free swing sees ratios only. With no inertia given, the fit says:",
         *(blind.unseen or (blind.verdict,)),
     ]
     if blind.directions.size:
-        told.append(
+        blocks.append(
             Picture(
                 name="scale", draw=lambda: directions_figure(blind),
                 caption="Singular values when no inertia is known: the last one vanishes, and its row mixes every "
@@ -156,24 +160,24 @@ def _blind_part(blind: Fit) -> Part:
                 description="; ".join(blind.unseen),
             )
         )  # fmt: skip
-    return Part("What the data cannot see", tuple(told))
+    return Part("What the data cannot see", tuple(blocks))
 
 
 def _energy_part(b: EnergyBalance) -> Part:
     """Which friction took the energy of the release."""
-    ends = ", ".join(f"{name} {1e3 * e[-1]:.1f} mJ" for name, e in b.taken.items())
+    ends = ", ".join(f"{name} {1e3 * e[-1]:.1f} mJ" for name, e in b.dissipated.items())
     shown = Picture(
-        name="energy", draw=lambda: energy_figure(b.t, b.stored, b.taken), description=f"At the end: {ends}.",
+        name="energy", draw=lambda: energy_figure(b.t, b.stored, b.dissipated), description=f"At the end: {ends}.",
         caption="Where the energy of the release went, as the fitted model tells it.",
     )  # fmt: skip
     return Part("Where the energy went", (shown,))
 
 
-def _drift_part(done: FreeSwing) -> Part:
+def _drift_part(result: FreeSwing) -> Part:
     """Where disk or cart go, and what keeps them."""
-    body, push, anchor = done.body, done.make.push, done.make.anchor
+    body, push, anchor = result.body, result.make.push, result.make.anchor
     factor, angle = (180 / math.pi, "°") if body == "disk" else (100.0, "cm")
-    told = (
+    reason = (
         f"Only friction acts about the axis of a level, free disk. Released at rest, its momentum about that axis "
         f"stays zero: the disk swings about a fixed line and creeps home as friction takes hold. A push of "
         f"{push:g} rad/s at the release gives it momentum; an axis {math.degrees(TILT):g}° out of level gives "
@@ -184,25 +188,25 @@ def _drift_part(done: FreeSwing) -> Part:
         f"friction rubs away: the cart swings about a line that creeps. A push of {push:g} m/s at the release "
         f"carries it off, and dry friction keeps it there. A spring of {anchor:g} N/m gives it a home."
     )
-    ends = ", ".join(f"{w.name} {factor * w.end:.1f} {angle}" for w in done.drifts)
+    ends = ", ".join(f"{w.name} {factor * w.end:.1f} {angle}" for w in result.drifts)
     shown = Picture(
-        name="drift", draw=lambda: drift_figure(done.drifts, body), description=f"At the end: {ends}.",
+        name="drift", draw=lambda: drift_figure(result.drifts, body), description=f"At the end: {ends}.",
         caption=f"Path of the {body} after the same release (thin) and the line about which it swings (bold).",
     )  # fmt: skip
     table = Table(
         caption=f"Drift of the {body} over 24 s after a release from horizontal",
         headings=("rig", f"slope [{angle}/s]", f"place at the end, from the release [{angle}]"),
-        rows=tuple((w.name, number(factor * w.slope, 2), number(factor * w.end, 2)) for w in done.drifts),
+        rows=tuple((w.name, number(factor * w.slope, 2), number(factor * w.end, 2)) for w in result.drifts),
         numbers=(1, 2),
     )
-    return Part(f"Why the {body} wanders", (told, table, shown))
+    return Part(f"Why the {body} wanders", (reason, table, shown))
 
 
-def _level_part(done: FreeSwing) -> Part:
+def _level_part(result: FreeSwing) -> Part:
     """Fits of the disk out of level."""
     rows: list[tuple[str, ...]] = []
     pictures: list[Picture] = []
-    answers = [done.answers[n] for n in _TILTED if n in done.answers]
+    answers = [result.answers[n] for n in _TILTED if n in result.answers]
     for a in answers:
         lean = a.fit.estimates.get("tilt_y")
         scores = [percent(_worst(a.fit, role, name)) for role in ("fit", "predict") for name in ("psi", "theta")]
@@ -221,12 +225,12 @@ def _level_part(done: FreeSwing) -> Part:
         headings=("model", "ψ fitted", "θ fitted", "ψ predicted", "θ predicted", "lean found"),
         rows=tuple(rows), numbers=(1, 2, 3, 4, 5),
     )  # fmt: skip
-    told = (
+    reason = (
         "The same fit on logs of the rig out of level: with a model that takes it for level, with one that may lean, "
         "and with the spring on."
     )
-    said = (f"{a.question.title}: {a.fit.verdict}" for a in answers)
-    return Part("Is the rig level?", (told, *said, table, *pictures))
+    verdicts = (f"{a.question.title}: {a.fit.verdict}" for a in answers)
+    return Part("Is the rig level?", (reason, *verdicts, table, *pictures))
 
 
 def _worst(fit: Fit, role: str, name: str) -> float:
@@ -234,10 +238,10 @@ def _worst(fit: Fit, role: str, name: str) -> float:
     return min(score.fit_percent[name] for score in fit.runs.values() if score.role == role)
 
 
-def _steps(done: FreeSwing) -> tuple[Step, ...]:
-    folder = done.folder
-    again, other = ("tilt_model", "level_model") if done.body == "disk" else ("no_scale", "no_scale")
-    predicted = "the rig out of level" if done.body == "disk" else "the study without an inertia"
+def _steps(result: FreeSwing) -> tuple[Step, ...]:
+    folder = result.folder
+    again, other = ("tilt_model", "level_model") if result.body == "disk" else ("no_scale", "no_scale")
+    predicted = "the rig out of level" if result.body == "disk" else "the study without an inertia"
     return (
         Step("Repeat a fit from its files, change a guess or a bound, and see what moves:",
              f"upright identify {typed(folder / f'{again}.toml')} -o {typed(folder / 'again')}"),
@@ -248,12 +252,12 @@ def _steps(done: FreeSwing) -> tuple[Step, ...]:
     )  # fmt: skip
 
 
-def _numbers(done: FreeSwing) -> dict[str, Any]:
-    answers = done.answers
-    found = recovered(done.rig, answers["free_swing"].fit) if "free_swing" in answers else ()
+def _numbers(result: FreeSwing) -> dict[str, Any]:
+    answers = result.answers
+    estimates = recovered(result.rig, answers["free_swing"].fit) if "free_swing" in answers else ()
     return {
         "parameters": {
-            f.name: {"truth": f.truth, "value": f.value, "interval": f.interval, "inside": f.inside} for f in found
+            f.name: {"truth": f.truth, "value": f.value, "interval": f.interval, "inside": f.inside} for f in estimates
         },
         "fits": {
             name: {
@@ -264,6 +268,6 @@ def _numbers(done: FreeSwing) -> dict[str, Any]:
             }
             for name, a in answers.items()
         },
-        "drift": {w.name: {"slope": w.slope, "end": w.end} for w in done.drifts},
-        "seconds": done.seconds,
+        "drift": {w.name: {"slope": w.slope, "end": w.end} for w in result.drifts},
+        "seconds": result.seconds,
     }

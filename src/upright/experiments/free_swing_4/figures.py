@@ -53,17 +53,17 @@ def _with_symbols(text: str) -> str:
 
 
 @styled
-def energy_figure(t: Array, stored: Array, taken: Mapping[str, Array]) -> Figure:
+def energy_figure(t: Array, stored: Array, dissipated: Mapping[str, Array]) -> Figure:
     """Stacked: energy still in the motion, and what each kind of friction has taken."""
     drawing = figure(2.7, margins=(0.62, 0.1, 0.12, 0.42))
     ax = drawing.subplots()
     thin = max(1, t.size // 400)
-    layers = [stored, *taken.values()]
+    layers = [stored, *dissipated.values()]
     colours = [SKY, VERMILLION, ORANGE, PURPLE, GREEN, GREY, BLUE]
     ax.stackplot(
         t[::thin],
         *[1e3 * layer[::thin] for layer in layers],
-        labels=["still in the motion", *(f"taken by {_with_symbols(name)}" for name in taken)],
+        labels=["still in the motion", *(f"taken by {_with_symbols(name)}" for name in dissipated)],
         colors=colours[: len(layers)],
         edgecolor="white",
         linewidth=0.4,

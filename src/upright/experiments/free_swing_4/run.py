@@ -41,14 +41,14 @@ FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
 
 @dataclass(frozen=True, kw_only=True)
 class Question:
-    """One fit of the experiment: what it shows, which logs it sees, what is known and asked."""
+    """One fit of the experiment: what it shows, which logs it sees, what is known and estimated."""
 
     name: str
     title: str
     fitted: str
     predicted: str
     known: Mapping[str, tuple[float, float]]
-    asked: Mapping[str, float]
+    guesses: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
     unknown: tuple[str, ...] = ("initial",)
     method: str = "auto"
@@ -124,7 +124,7 @@ def questions(rig: Rig, weighed: Known | None = None) -> tuple[Question, ...]:
             fitted=f"release_90{log}.csv",
             predicted=f"release_60{log}.csv",
             known=known,
-            asked={**guess, **more},
+            guesses={**guess, **more},
             bounds={n: b for n, b in tilt.items() if n in more},
         )
 
@@ -165,7 +165,7 @@ def question_text(q: Question, rig: Rig) -> str:
     for name, (value, spread) in q.known.items():
         known, uncertainty = wearing_unit(name, value), wearing_unit(name, spread)
         parameters.key(name, {"value": known, "uncertainty": uncertainty} if spread else known)
-    for name, guess in q.asked.items():
+    for name, guess in q.guesses.items():
         low, high = q.bounds.get(name, (0.0, math.inf))
         bounds = {"min": low} | ({"max": high} if math.isfinite(high) else {})
         parameters.key(name, {"guess": wearing_unit(name, guess), **bounds})
@@ -235,7 +235,7 @@ class EnergyBalance:
 
     t: Array
     stored: Array
-    taken: Mapping[str, Array]
+    dissipated: Mapping[str, Array]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -282,43 +282,45 @@ def run_free_swing(
     folder : Path
         Takes logs and studies.
     progress : callable, optional
-        Told the step at work and the share of the experiment done.
+        Called with the current step and the share of the experiment completed.
     stopped : callable, optional
         Asked after each fit whether to stop there; a fit may finish on its best so far when Ctrl-C is pressed.
     weighed : Known, optional
         Inertia of disk or cart as experiment 1a found it.
     """
     began = time.perf_counter()
-    done = FreeSwing(rig=freed(replace(rig, seed=seed)), folder=folder, weighed=weighed)
+    result = FreeSwing(rig=freed(replace(rig, seed=seed)), folder=folder, weighed=weighed)
     try:
         progress("releasing the pendulum", 0.0)
-        asked = write_questions(done.rig, folder, weighed)
-        for i, (question, path) in enumerate(asked):
-            base, part = 0.05 + 0.85 * i / len(asked), 0.85 / len(asked)
-            found = fit_question(question, path, lambda step, share, b=base, p=part: progress(step, b + p * share))
-            done.answers[question.name] = found
-            if found.fit.interrupted or stopped():
+        questions = write_questions(result.rig, folder, weighed)
+        for i, (question, path) in enumerate(questions):
+            base, part = 0.05 + 0.85 * i / len(questions), 0.85 / len(questions)
+            answer = fit_question(question, path, lambda step, share, b=base, p=part: progress(step, b + p * share))
+            result.answers[question.name] = answer
+            if answer.fit.interrupted or stopped():
                 raise KeyboardInterrupt
         progress("following the body that carries it", 0.9)
-        done.drifts = drift_paths(done.rig)
-        done.balance = balance(done)
+        result.drifts = drift_paths(result.rig)
+        result.balance = balance(result)
     except KeyboardInterrupt:
-        done.interrupted = True
-    done.seconds = time.perf_counter() - began
-    return done
+        result.interrupted = True
+    result.seconds = time.perf_counter() - began
+    return result
 
 
-def balance(done: FreeSwing) -> EnergyBalance:
+def balance(result: FreeSwing) -> EnergyBalance:
     """Where the energy of the first release went, as the fitted model tells it."""
-    fit = done.answers["free_swing"].fit
+    fit = result.answers["free_swing"].fit
     values = {n: p.value for n, p in fit.model.parameters.items() if n in fit.model.plant.names()}
     values |= {n: e.value for n, e in fit.estimates.items() if n in values}
-    model = done.rig.plant.replace(**values)
-    t, x = motion(replace(done.rig, plant=model), seconds=12.0, every=1)
+    model = result.rig.plant.replace(**values)
+    t, x = motion(replace(result.rig, plant=model), seconds=12.0, every=1)
     stored = model.energy(x) - float(model.energy(model.state()))
-    taken = losses(model, t, x)
+    dissipated = losses(model, t, x)
     every = max(1, round(0.02 / SERVO))
-    return EnergyBalance(t=t[::every], stored=stored[::every], taken={n: e[::every] for n, e in taken.items()})
+    return EnergyBalance(
+        t=t[::every], stored=stored[::every], dissipated={n: e[::every] for n, e in dissipated.items()}
+    )
 
 
 def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
@@ -337,5 +339,5 @@ def losses(plant: Plant, t: Array, x: Array) -> dict[str, Array]:
         for kind, name, power in (("Coulomb friction", joint.coulomb, speed), ("drag", joint.quadratic, speed**3)):
             if name and values[name] > 0:
                 powers[f"{kind} of {joint.on}"] = values[name] * power
-    taken = {name: np.asarray(cumulative_trapezoid(power, t, initial=0)) for name, power in powers.items()}
-    return {name: energy for name, energy in taken.items() if energy[-1] > 0}
+    dissipated = {name: np.asarray(cumulative_trapezoid(power, t, initial=0)) for name, power in powers.items()}
+    return {name: energy for name, energy in dissipated.items() if energy[-1] > 0}

@@ -41,7 +41,7 @@ PROBED, PERIODS = 2, 8
 
 @dataclass(frozen=True, kw_only=True)
 class Asking:
-    """What the rig is asked: a band [rad/s], amplitudes wanted [m or rad], and one period of the command that asks."""
+    """Excitation of the rig: a band [rad/s], amplitudes wanted [m or rad], and one period of the command."""
 
     band: tuple[float, float]
     reach: Array
@@ -64,7 +64,7 @@ def asking(stand: TestStand) -> Asking:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
             raise BadInput(
-                f"{model.name} does not swing about '{at}', and the band of frequencies it is asked is told from its "
+                f"{model.name} does not swing about '{at}', and the band of its excitation follows from its "
                 "swings; log a step of it instead (upright run --excite), and fit that (upright identify)."
             )
         band = (BELOW * min(swings), ABOVE * max(swings))
@@ -101,50 +101,52 @@ def run_at_once(
     RigStopped
         When the rig was stopped by a limit, or was not left to rest.
     """
-    asked = asking(stand)
+    request = asking(stand)
     names = stand.names
     rests = f"{names[-1]} hang at rest" if stand.resting == "hanging" else "everything rest"
     still = f"Let {rests}, with {names[0]} in the middle of its travel and room around it"
     still = f"Take the added masses off. {still}" if weighed else still
     most = SHARE * stand.rig.limit
-    right = _level(stand, asked, most)  # by the guesses
+    right = _level(stand, request, most)  # by the guesses
     level, stronger, logs = PROBES[0] * right, right, list[Record]()
     for i, share in enumerate(PROBES):
         progress(f"probing, {i + 1} of {len(PROBES)}", 0.3 * i / len(PROBES))
         level = min(share * stronger, GROWTH * level, most)
         stand.ask(f"{still}; probe {i + 1} of {len(PROBES)} follows.")
-        logs.append(stand.run(_from_rest(stand, level * asked.wave, PROBED), folder, "probe"))
-        stronger = min(level / max(_share(logs[-1], names, asked), 1e-3), most)
+        logs.append(stand.run(_from_rest(stand, level * request.wave, PROBED), folder, "probe"))
+        stronger = min(level / max(_share(logs[-1], names, request), 1e-3), most)
     level = min(stronger, GROWTH * level)
-    seconds = PERIODS * asked.wave.size * stand.rig.period
+    seconds = PERIODS * request.wave.size * stand.rig.period
     stand.ask(f"{still}; all frequencies at once follow for {seconds:.0f} s.")
     progress(f"asking all frequencies at once for {seconds:.0f} s", 0.3)
-    log = stand.run(_from_rest(stand, level * asked.wave, PERIODS), folder, "multisine")
-    runs = [_run("multisine", log, asked, PERIODS), _run("probe", logs[-1], asked, PROBED) | {"role": "predict"}]
+    log = stand.run(_from_rest(stand, level * request.wave, PERIODS), folder, "multisine")
+    runs = [_run("multisine", log, request, PERIODS), _run("probe", logs[-1], request, PROBED) | {"role": "predict"}]
     path = write_study(stand, folder / "study.toml", f"Hanging: {stand.rig.name}", runs, known=weighed)
-    wish = LogRequest(kind="multisine", hold=stand.rig.period, band=asked.band, signals={}, counts={}, known={})
+    log_request = LogRequest(
+        kind="multisine", hold=stand.rig.period, band=request.band, signals={}, counts={}, known={}
+    )
     alone = {**runs[0], "file": f"../{file_of(log)}"}
     answered = write_study(stand, folder / "response" / "study.toml", f"Response: {stand.rig.name}", [alone],
                            known=weighed)  # fmt: skip
     tell = part(progress, 0.5, 0.6, "fitting the response")
     try:
-        response = response_of_logs([answered], wish, answered.parent, tell=tell)
+        response = response_of_logs([answered], log_request, answered.parent, tell=tell)
     except NotIdentifiable:  # friction may leave too few frequencies; the motion says more
         response = None
     study, fit = fit_study(path, part(progress, 0.6, 1.0, "fitting the motion"))
     return AtOnce(response=response, study=study, fit=fit)
 
 
-def _run(label: str, log: Record, asked: Asking, periods: int) -> dict[str, Any]:
+def _run(label: str, log: Record, request: Asking, periods: int) -> dict[str, Any]:
     """The part of a log in which the command was whole: while it grows, what sticks and slips hardly moves, and a
     simulation that errs there is lost from there on.
     """
-    window = [float(log.t[-periods * asked.wave.size]), float(log.t[-1])]
+    window = [float(log.t[-periods * request.wave.size]), float(log.t[-1])]
     return {"label": label, "file": file_of(log), "window": window}
 
 
 def _from_rest(stand: TestStand, wave: Array, periods: int) -> list[float]:
-    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those asked for.
+    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those requested.
 
     What begins at once gives a free axis a push, on which it drifts out of its travel.
     """
@@ -152,18 +154,18 @@ def _from_rest(stand: TestStand, wave: Array, periods: int) -> list[float]:
     return np.concatenate([np.zeros(math.ceil(STILL / stand.rig.period)), growing, np.tile(wave, periods)]).tolist()
 
 
-def _level(stand: TestStand, asked: Asking, most: float) -> float:
+def _level(stand: TestStand, request: Asking, most: float) -> float:
     """Largest command that by the guesses moves no coordinate further than wanted."""
-    spectrum = np.fft.rfft(asked.wave)
-    omega = 2 * math.pi * np.arange(spectrum.size) / (asked.wave.size * stand.rig.period)
+    spectrum = np.fft.rfft(request.wave)
+    omega = 2 * math.pi * np.arange(spectrum.size) / (request.wave.size * stand.rig.period)
     lines = np.flatnonzero(np.abs(spectrum) > 1e-6 * np.abs(spectrum).max())
-    answer = np.zeros((asked.reach.size, spectrum.size), dtype=np.complex128)
+    answer = np.zeros((request.reach.size, spectrum.size), dtype=np.complex128)
     answer[:, lines] = stand.rig.linear(stand.resting).response(omega[lines])[:, :, 0].T * spectrum[lines]
-    peaks = np.ptp(np.fft.irfft(answer, asked.wave.size, axis=1), axis=1) / 2
-    return float(min(most, np.min(asked.reach / np.maximum(peaks, 1e-12))))
+    peaks = np.ptp(np.fft.irfft(answer, request.wave.size, axis=1), axis=1) / 2
+    return float(min(most, np.min(request.reach / np.maximum(peaks, 1e-12))))
 
 
-def _share(log: Record, names: list[str], asked: Asking) -> float:
+def _share(log: Record, names: list[str], request: Asking) -> float:
     """Largest amplitude over the last period of a probe, beside the one that is wanted."""
-    seen = np.column_stack([log[n] for n in names])[-asked.wave.size :]
-    return float(np.max(np.ptp(seen, axis=0) / (2 * asked.reach)))
+    measured = np.column_stack([log[n] for n in names])[-request.wave.size :]
+    return float(np.max(np.ptp(measured, axis=0) / (2 * request.reach)))

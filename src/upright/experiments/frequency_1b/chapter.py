@@ -1,4 +1,4 @@
-"""Experiment 1b as a chapter: what was asked, what came back, both fits side by side, and the pole to be held."""
+"""Experiment 1b as a chapter: excitation, response, both fits side by side, and the pole to be stabilised."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ QUESTION = (
     "What does the rig answer to a sine, and which numbers of its equations does that fix, the pole by which it falls "
     "upright among them?"
 )
-_ASKED = {
+_EXCITATION = {
     "sines": "one sine after the other",
     "multisine": "all frequencies at once, periods averaged",
     "sweep": "a sweep up and down, windows averaged",
 }
 
 
-def chapter(done: FrequencyRun) -> Chapter:
+def chapter(result: FrequencyRun) -> Chapter:
     """The experiment on a twin."""
-    answer = done.answer
-    true = true_key(done)
-    found = key_value(answer.key)
-    inside = found.interval[0] <= true <= found.interval[1]
-    off = 100 * abs(found.value / true - 1)
-    upright = "inverted" in done.rig.plant.equilibria
+    answer = result.answer
+    true = true_key(result)
+    estimate = key_value(answer.key)
+    inside = estimate.interval[0] <= true <= estimate.interval[1]
+    off = 100 * abs(estimate.value / true - 1)
+    upright = "inverted" in result.rig.plant.equilibria
     return Chapter(
         key="1b",
         title="Frequency response of the hanging rig" if upright else "Frequency response",
@@ -49,27 +49,27 @@ def chapter(done: FrequencyRun) -> Chapter:
         f"interval. {_simplex_sentence(answer)}",
         sound=answer.fit.trusted,
         parts=(
-            Part("What was asked", (*_campaign(done), _quality_picture(answer.data))),
-            *_answer_parts(answer, truth=done.truth, known=_bench(done)),
+            Part("Excitation", (*_campaign(result), _quality_picture(answer.data))),
+            *_answer_parts(answer, truth=result.truth, known=_bench(result)),
         ),
-        steps=_steps(done),
-        findings=_findings(done, found, true),
-        numbers=_numbers(answer, truth=done.truth, key=true)
-        | {"at_the_rig": done.sweep.seconds, "seconds": done.seconds},
+        steps=_steps(result),
+        findings=_findings(result, estimate, true),
+        numbers=_numbers(answer, truth=result.truth, key=true)
+        | {"at_the_rig": result.sweep.seconds, "seconds": result.seconds},
     )
 
 
-def log_chapter(found: LoggedResponse) -> Chapter:
+def log_chapter(result: LoggedResponse) -> Chapter:
     """What logs of one's own say, in the same frame."""
-    data, answer = found.response, found.answer
+    data, answer = result.response, result.answer
     span = f"{data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s"
-    sources = f"{len(data)} frequencies from {span} in {', '.join(found.sources)}."
-    asked = Part("What was asked", (sources, *data.notes, _quality_picture(data)))
-    fit = typed(found.folder / "fit.json")
+    sources = f"{len(data)} frequencies from {span} in {', '.join(result.sources)}."
+    source_part = Part("Excitation", (sources, *data.notes, _quality_picture(data)))
+    fit = typed(result.folder / "fit.json")
     if answer is not None:
         return Chapter(
             key="1b", title="Frequency response of a rig", question=QUESTION, verdict=answer.fit.verdict,
-            detail=_simplex_sentence(answer), sound=answer.fit.trusted, parts=(asked, *_answer_parts(answer)),
+            detail=_simplex_sentence(answer), sound=answer.fit.trusted, parts=(source_part, *_answer_parts(answer)),
             steps=(
                 Step("Find gains for these numbers, and what their errors do to the loop.",
                      f"upright design {fit} --lqr 1,0,1,0 --limit 5"),
@@ -89,10 +89,10 @@ def log_chapter(found: LoggedResponse) -> Chapter:
     return Chapter(
         key="1b", title="Frequency response", question="What does the rig answer, frequency by frequency?",
         verdict=verdict, sound=not poor.all(),
-        parts=(asked, Part("Response", (_bode_picture(data), _response_table(response)))),
+        parts=(source_part, Part("Response", (_bode_picture(data), _response_table(response)))),
         steps=(
             Step("Fit it: name the make, and what of it is known.",
-                 f"upright frequency {typed(found.folder / 'frequency.csv')} --rig linear -o again"),
+                 f"upright frequency {typed(result.folder / 'frequency.csv')} --rig linear -o again"),
             Step("Take it to python-control.",
                  "FrequencyResponse.from_csv('frequency.csv').to_control()"),
         ),
@@ -100,80 +100,80 @@ def log_chapter(found: LoggedResponse) -> Chapter:
     )  # fmt: skip
 
 
-def at_once_chapter(done: AtOnce, folder: Path, truth: Mapping[str, float]) -> Chapter:
+def at_once_chapter(result: AtOnce, folder: Path, truth: Mapping[str, float]) -> Chapter:
     """The motion's fit, and the response frequency by frequency before it."""
-    told = fit_chapter(done.study, done.fit, folder, truth)
-    if done.response is None:
+    page = fit_chapter(result.study, result.fit, folder, truth)
+    if result.response is None:
         left = "Dry friction left too few frequencies for a response; the numbers rest on the motion alone."
-        return replace(told, warnings=(*told.warnings, left))
-    asked = log_chapter(done.response)
+        return replace(page, warnings=(*page.warnings, left))
+    of_log = log_chapter(result.response)
     question = "What does the rig answer while it hangs, and which numbers of its equations does that fix?"
     return replace(
-        told, question=question, parts=(*asked.parts[:2], *told.parts),
-        numbers={**told.numbers, "response": asked.numbers},
+        page, question=question, parts=(*of_log.parts[:2], *page.parts),
+        numbers={**page.numbers, "response": of_log.numbers},
     )  # fmt: skip
 
 
-def true_key(done: FrequencyRun) -> float:
+def true_key(result: FrequencyRun) -> float:
     """The key number of the twin itself."""
-    at, what, _ = done.answer.key
-    poles = done.rig.plant.linear(at).poles()
+    at, what, _ = result.answer.key
+    poles = result.rig.plant.linear(at).poles()
     if what == "unstable pole":
         return float(poles[0].real)
     return float(poles.imag.max())
 
 
-def _findings(done: FrequencyRun, found: Estimate, true: float) -> tuple[KeyNumber, ...]:
+def _findings(result: FrequencyRun, estimate: Estimate, true: float) -> tuple[KeyNumber, ...]:
     """The key number, inertia of the pendulum and gain of the drive, which nobody weighs."""
-    at, what, _ = done.answer.key
+    at, what, _ = result.answer.key
     of = "1/s" if what == "unstable pole" else "rad/s"
-    out = [finding(f"{what}, {at} [{of}]", found, true)]
-    estimates = done.answer.fit.estimates
+    out = [finding(f"{what}, {at} [{of}]", estimate, true)]
+    estimates = result.answer.fit.estimates
     if (e := estimates.get("J_p")) is not None:
-        out.append(finding(Symbol(f"J_p [{unit(e.unit)}]"), e, done.truth["J_p"]))
+        out.append(finding(Symbol(f"J_p [{unit(e.unit)}]"), e, result.truth["J_p"]))
     if (e := estimates.get("actuator.gain")) is not None:
-        out.append(finding(f"gain of the drive [{unit(e.unit)}]", e, done.truth["actuator.gain"]))
+        out.append(finding(f"gain of the drive [{unit(e.unit)}]", e, result.truth["actuator.gain"]))
     return tuple(out)
 
 
-def _campaign(done: FrequencyRun) -> tuple[str, ...]:
-    data = done.answer.data
-    settle = np.array([d.settle for d in done.sweep.dwells])
+def _campaign(result: FrequencyRun) -> tuple[str, ...]:
+    data = result.answer.data
+    settle = np.array([d.settle for d in result.sweep.dwells])
     waited = settle[np.isfinite(settle)]
-    told = [
-        f"{len(data)} frequencies from {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s, {_ASKED[done.kind]}, in "
-        f"{done.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every "
+    sentences = [
+        f"{len(data)} frequencies from {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s, {_EXCITATION[result.kind]}, "
+        f"in {result.sweep.seconds / 60:.0f} minutes at the rig. Commands were chosen, from probes, to move every "
         "coordinate well above stiction and encoder steps, and to stay within the drive's limit and the travel."
     ]
     if waited.size:
         late = settle.size - waited.size
         rest = f"; {late} had not settled after 40 s, and what beats there counts as their error" if late else ""
-        told.append(
-            "Each sine was awaited until what was left of its transient, told from the data, had died away: "
+        sentences.append(
+            "Each sine ran until its transient, estimated from the data, had decayed: "
             f"{waited.min():.0f} to {waited.max():.0f} s{rest}."
         )
     else:
-        told += data.notes
-    return tuple(told)
+        sentences += data.notes
+    return tuple(sentences)
 
 
-def _bench(done: FrequencyRun) -> str:
-    names = ", ".join(f"{n} to {100 * s:g} %" for n, s in done.make.bench.items())
-    weighed = {n: p for n, p in done.answer.rig.parameters.items() if p.uncertainty and n not in done.make.bench}
+def _bench(result: FrequencyRun) -> str:
+    names = ", ".join(f"{n} to {100 * s:g} %" for n, s in result.make.bench.items())
+    weighed = {n: p for n, p in result.answer.rig.parameters.items() if p.uncertainty and n not in result.make.bench}
     if weighed:
         shares = ", ".join(f"{n} to {100 * p.uncertainty / p.value:.2g} %" for n, p in weighed.items())
         names += f"; from experiment 1a: {shares}"
     return (
         f"Known from the bench: {names}. A response sees masses, frictions and the drive's gain only relative to each "
         "other, so the bench fixes the scale; the unstable pole does not depend on it."
-        if done.answer.key[1] == "unstable pole"
+        if result.answer.key[1] == "unstable pole"
         else f"Known from the bench: {names}; it fixes the scale of masses, stiffness, frictions and gain."
     )
 
 
-def _steps(done: FrequencyRun) -> tuple[Step, ...]:
+def _steps(result: FrequencyRun) -> tuple[Step, ...]:
     """What to do next with the fit."""
-    answer, folder, make = done.answer, done.folder, done.make
+    answer, folder, make = result.answer, result.folder, result.make
     fit = typed(folder / "fit.json")
     if answer.key[1] == "unstable pole":
         gains = f'upright design {fit} --at {answer.key[0]} --poles "-4.15+-1.63j, -16.9, -3.2"'
@@ -195,11 +195,11 @@ def _steps(done: FrequencyRun) -> tuple[Step, ...]:
 
 def _simplex_sentence(answer: FrequencyFit) -> str:
     """What the paper's way says about the same number."""
-    found = key_value(answer.key)
+    estimate = key_value(answer.key)
     there = answer.simplex_pole.real if answer.key[1] == "unstable pole" else answer.simplex_pole.imag
     if not math.isfinite(there):
         return "The simplex on dB ends at a rig without such a pole."
-    off = 100 * (there / found.value - 1)
+    off = 100 * (there / estimate.value - 1)
     why = (
         " It fits a linear model, in which dry friction has to pass for viscous friction."
         if abs(off) > 1 and any(j.coulomb in answer.squares.names for j in answer.rig.plant.joints)
@@ -247,10 +247,10 @@ def _start_sentence(answer: FrequencyFit) -> str:
 
 def _way_table(answer: FrequencyFit) -> Table:
     """Both methods side by side."""
-    found = key_value(answer.key)
+    estimate = key_value(answer.key)
     unstable = answer.key[1] == "unstable pole"
-    d = digits(found)
-    poles = (answer.simplex_pole.real if unstable else answer.simplex_pole.imag, found.value)
+    d = digits(estimate)
+    poles = (answer.simplex_pole.real if unstable else answer.simplex_pole.imag, estimate.value)
     rows = tuple(
         (w.name, number(w.squares_dB, 3), str(w.evaluations), number(w.seconds, 2), number(p, n))
         for w, p, n in ((answer.simplex, poles[0], 4), (answer.squares.way, poles[1], d))
@@ -263,7 +263,7 @@ def _way_table(answer: FrequencyFit) -> Table:
 
 
 def _parameter_table(answer: FrequencyFit, truth: Mapping[str, float] | None = None) -> Table:
-    """Every number, by both ways; a magnitude of the linear model is not asked for all of them."""
+    """Every number, by both ways; a magnitude of the linear model does not determine all of them."""
     unasked = {j.coulomb for j in answer.rig.plant.joints} | {"actuator.lag", "actuator.delay"}
     unasked |= {n for n, p in answer.rig.parameters.items() if not p.estimate}
     walked = {n: "–" if n in unasked else number(answer.simplex.values[n]) for n in answer.fit.estimates}
@@ -275,14 +275,14 @@ def _parameter_table(answer: FrequencyFit, truth: Mapping[str, float] | None = N
 
 def _bode_picture(data: FrequencyResponse, answer: FrequencyFit | None = None) -> Picture:
     """The paper's fig. 5 with residuals."""
-    told = (
+    caption = (
         "Magnitude and phase of what the encoders showed per unit of command, with 95 % bars (mostly smaller than the "
         "points); both fits; below, what each fit leaves, on a scale that is linear within ±0.1."
         if answer is not None
         else "Magnitude and phase of each output per unit of command, with 95 % bars."
     )
     return Picture(
-        name="bode", caption=told,
+        name="bode", caption=caption,
         draw=lambda: bode_figure(data, answer, fine=curves(answer) if answer is not None else ()),
         description=f"{len(data)} frequencies, {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s.",
     )  # fmt: skip
@@ -340,12 +340,12 @@ def _response_numbers(data: FrequencyResponse) -> dict[str, Any]:
     }
 
 
-def _response_table(told: Mapping[str, Any]) -> Table:
+def _response_table(response: Mapping[str, Any]) -> Table:
     """A response, output by output, from `_response_numbers`."""
     rows = tuple(
         (name, number(w, 4), number(o["magnitude_dB"][k], 4), number(o["phase_deg"][k], 4),
          number(o["error_percent"][k], 2), number(o["coherence"][k], 4))
-        for name, o in told["outputs"].items() for k, w in enumerate(told["omega"])
+        for name, o in response["outputs"].items() for k, w in enumerate(response["omega"])
     )  # fmt: skip
     return Table(
         caption="Response", headings=("", "rad/s", "dB", "deg", "error [%]", "coherence"), rows=rows,

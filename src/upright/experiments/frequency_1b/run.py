@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from upright import units
 from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
-from upright.experiments.stand.known import Known, asked, bench
+from upright.experiments.stand.known import Known, bench, model_of
 from upright.identification import GreyBox
 from upright.identification.frequency.answer import FrequencyFit, explain
 from upright.identification.frequency.response import FrequencyResponse, is_response
@@ -45,7 +45,7 @@ class FrequencyRun:
     folder : Path
         Holds `frequency.csv`, `sweep.csv` and `fit.json`.
     kind : str
-        How it was asked: sines, multisine or sweep.
+        Excitation: sines, multisine or sweep.
     seconds : float
         Time at the computer [s].
     """
@@ -83,7 +83,7 @@ def run_frequency(
     seed : int
     folder : Path
     progress, stopped : callables
-        Told the step at work and the share done; asked between two steps whether to stop.
+        Called with the current step and the share completed; asked between two steps whether to stop.
     weighed : sequence of Known
         What experiment 1a found; it joins what the bench says.
     kind : {"sines", "multisine", "sweep"}
@@ -100,18 +100,18 @@ def run_frequency(
     sweep = stepped_sine(rig, make) if kind == "sines" else broadband(rig, make, kind, seed=seed)
     if stopped():
         raise KeyboardInterrupt
-    said, tolerance = bench(rig, make), dict(make.bench)
+    known, tolerance = bench(rig, make), dict(make.bench)
     for k in weighed:
-        said[k.name], tolerance[k.name] = k.value, k.stderr / k.value
+        known[k.name], tolerance[k.name] = k.value, k.stderr / k.value
     at = next(iter(rig.plant.equilibria))
 
     def follow(step: str, share: float) -> None:
         progress(step, 0.3 + (0.25 * share if "least" in step else 0.4))
 
-    answer = explain(asked(make, said, tolerance), at, sweep.response, seed=seed, tell=follow, stopped=stopped)
+    answer = explain(model_of(make, known, tolerance), at, sweep.response, seed=seed, tell=follow, stopped=stopped)
     progress("writing the log and the fit", 0.9)
     title = f"Frequency response of {rig.name}, seed {rig.seed}"
-    write_response_fit(answer, folder, make.plant_name, title, said=hardware_of_make(rig))
+    write_response_fit(answer, folder, make.plant_name, title, known_hardware=hardware_of_make(rig))
     sweep.log.to_csv(folder / "sweep.csv")
     progress("done", 1.0)
     return FrequencyRun(
@@ -134,7 +134,7 @@ class LogRequest:
     counts : mapping of str to float
         Counts per rad or m by coordinate, negative when they count the other way.
     kind : str
-        How the rig was asked; told from the command when empty.
+        Excitation; recognised from the command when empty.
     hold : float, optional
         Time for which the converter holds a command [s].
     band : (float, float)
@@ -167,7 +167,7 @@ class LoggedResponse:
 
 
 def response_of_logs(
-    sources: Sequence[Path], wish: LogRequest, folder: Path, *, data: Path | None = None, tell: Progress = silent
+    sources: Sequence[Path], request: LogRequest, folder: Path, *, data: Path | None = None, tell: Progress = silent
 ) -> LoggedResponse:
     """Response of the sources, fitted when plant and numbers are named; writes `frequency.csv` and `fit.json`.
 
@@ -175,52 +175,52 @@ def response_of_logs(
     ----------
     sources : sequence of Path
         One study, one response, or logs that repeat one another.
-    wish : LogRequest
+    request : LogRequest
     folder : Path
     data : Path, optional
         Folder of a study's logs.
     tell : Progress
-        Told the step at work.
+        Called with the current step.
     """
     rest: GreyBox | None = None
-    plant, said = "", Hardware()
+    plant, hardware = "", Hardware()
     if len(sources) == 1 and sources[0].suffix == ".toml":
-        rest, plant, records, resolution, said = _study(sources[0], data)
-        response = response_of(records, command="u", outputs=records[0].outputs, kind=wish.kind, hold=wish.hold,
-                               resolution=resolution, band=wish.band)  # fmt: skip
+        rest, plant, records, resolution, hardware = _study(sources[0], data)
+        response = response_of(records, command="u", outputs=records[0].outputs, kind=request.kind, hold=request.hold,
+                               resolution=resolution, band=request.band)  # fmt: skip
     elif len(sources) == 1 and is_response(sources[0]):
         response = FrequencyResponse.from_csv(sources[0])
-        if wish.band is not None:
-            response = response.only((response.omega >= wish.band[0]) & (response.omega <= wish.band[1]))
+        if request.band is not None:
+            response = response.only((response.omega >= request.band[0]) & (response.omega <= request.band[1]))
     else:
-        response = _logs(sources, wish)
-    if wish.make and rest is None:
-        rest, plant = _designed(wish), make_named(wish.make).plant_name
-        said = Hardware(vendor=make_named(wish.make).vendor)
+        response = _logs(sources, request)
+    if request.make and rest is None:
+        rest, plant = _designed(request), make_named(request.make).plant_name
+        hardware = Hardware(vendor=make_named(request.make).vendor)
     folder.mkdir(parents=True, exist_ok=True)
     names = tuple(s.name for s in sources)
     if rest is None:
         response.to_csv(folder / "frequency.csv")
         return LoggedResponse(sources=names, response=response, answer=None, folder=folder)
     at = next(iter(rest.plant.equilibria))
-    answer = explain(rest, at, response, seed=wish.seed, tell=tell)
-    write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names), said)
+    answer = explain(rest, at, response, seed=request.seed, tell=tell)
+    write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names), hardware)
     return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
 
 
-def _designed(wish: LogRequest) -> GreyBox:
-    """Numbers of a make: as designed where nothing is said, known within a tolerance where the bench usually tells."""
-    make = make_named(wish.make)
-    values = make.plant.parameters()
-    for name in wish.known:
+def _designed(request: LogRequest) -> GreyBox:
+    """Numbers of a make: nominal where not specified, known within a tolerance where a bench usually measures them."""
+    make = make_named(request.make)
+    values = make.rig.plant.parameters()
+    for name in request.known:
         if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):
-            raise BadInput(f"'{wish.make}' has no number '{name}'; {nearest(name, values)}")
-    said = {n: values[n] for n in make.bench} | {n: v for n, (v, _) in wish.known.items() if n in values}
-    tolerance = dict(make.bench) | {n: u / v if v else 0.0 for n, (v, u) in wish.known.items()}
-    rest = asked(make, said, tolerance)
+            raise BadInput(f"'{request.make}' has no number '{name}'; {nearest(name, values)}")
+    known = {n: values[n] for n in make.bench} | {n: v for n, (v, _) in request.known.items() if n in values}
+    tolerance = dict(make.bench) | {n: u / v if v else 0.0 for n, (v, u) in request.known.items()}
+    rest = model_of(make, known, tolerance)
     changed = {
         n: replace(rest.parameters[n], value=v, uncertainty=u, estimate=False)
-        for n, (v, u) in wish.known.items() if n not in values
+        for n, (v, u) in request.known.items() if n not in values
     }  # fmt: skip
     return replace(rest, parameters={**rest.parameters, **changed})
 
@@ -240,42 +240,45 @@ def _study(path: Path, data: Path | None) -> tuple[GreyBox, str, list[Record], l
     return study.model, study.plant, records, list(runs[0].resolution or [0.0] * len(runs[0].measured)), study.hardware
 
 
-def _logs(sources: Sequence[Path], wish: LogRequest) -> FrequencyResponse:
+def _logs(sources: Sequence[Path], request: LogRequest) -> FrequencyResponse:
     from upright.readers import read
 
     records = [read(path) for path in sources]
     first = records[0]
-    command = wish.command or (first.inputs[0] if len(first.inputs) == 1 else "")
+    command = request.command or (first.inputs[0] if len(first.inputs) == 1 else "")
     if not command:
         raise BadInput(f"The log holds the columns {', '.join(first.names)}; say which one drives with --command.")
-    signals = dict(wish.signals) or {n: n for n in first.outputs or [n for n in first.names if n != command]}
-    for name in wish.counts:
+    signals = dict(request.signals) or {n: n for n in first.outputs or [n for n in first.names if n != command]}
+    for name in request.counts:
         if name not in signals:
             raise BadInput(f"--counts names '{name}', which is no output; {nearest(name, signals)}")
-    scaled = [_scaled(r, command, signals, wish) for r in records]
+    scaled = [_scaled(r, command, signals, request) for r in records]
     resolution = [_step(scaled[0][n]) for n in signals]
-    return response_of(scaled, command=command, outputs=list(signals), kind=wish.kind, hold=wish.hold,
-                       resolution=resolution, band=wish.band)  # fmt: skip
+    return response_of(scaled, command=command, outputs=list(signals), kind=request.kind, hold=request.hold,
+                       resolution=resolution, band=request.band)  # fmt: skip
 
 
-def _scaled(record: Record, command: str, signals: Mapping[str, str], wish: LogRequest) -> Record:
+def _scaled(record: Record, command: str, signals: Mapping[str, str], request: LogRequest) -> Record:
     columns = {command: record[command]}
-    told = {command: record.units.get(command, "")}
+    si_units = {command: record.units.get(command, "")}
     for name, column in signals.items():
         unit = record.units.get(column, "")
         si = next((s for s in ("rad", "m") if unit and units.known(unit) and units.same_dimension(unit, s)), "")
-        if name in wish.counts:
-            columns[name], told[name] = record[column] / wish.counts[name], "m" if name.startswith("x") else "rad"
+        if name in request.counts:
+            columns[name], si_units[name] = (
+                record[column] / request.counts[name],
+                "m" if name.startswith("x") else "rad",
+            )
         elif si and unit != "counts":
-            columns[name], told[name] = record[column] * units.scale(unit), si
-        elif wish.make and unit == "counts":
+            columns[name], si_units[name] = record[column] * units.scale(unit), si
+        elif request.make and unit == "counts":
             raise BadInput(
                 f"Column '{column}' is in counts, and the fit needs rad or m: say how many make one, as in --counts "
                 f"{name}=2546.5 (negative when it counts the other way)."
             )
         else:
-            columns[name], told[name] = record[column], unit
-    return Record(t=record.t, signals=columns, units=told, inputs=(command,), outputs=tuple(signals),
+            columns[name], si_units[name] = record[column], unit
+    return Record(t=record.t, signals=columns, units=si_units, inputs=(command,), outputs=tuple(signals),
                   provenance=record.provenance)  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Pictures of experiment 2: the runs, what was told of them beforehand, and the ways to the velocities."""
+"""Pictures of experiment 2: the runs, their predictions, and the velocity estimators."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
         runs = [(a.before.run, "predicted", ORANGE, "--", 2.0)]
         runs += [(a.after, "measured", BLUE, "-", 1.1)] if a.after is not None else []
         for run, name, colour, line, width in runs:
-            found = score(run)
-            lost = min(found.fell, found.ran_out)
+            scored = score(run)
+            lost = min(scored.fell, scored.ran_out)
             shown = run.t <= min(seconds, lost)
             for row, i in enumerate(order):
                 turn = 180 / math.pi if coordinates[i].unit == "rad" else 100.0
@@ -75,30 +75,30 @@ def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
 
 def _ends(row: Any, travel: float) -> None:
     """Where the travel ends, if that is in sight."""
-    seen = max(abs(v) for v in row[0].get_ylim())
+    shown = max(abs(v) for v in row[0].get_ylim())
     for ax in row:
         for side in (-1, 1):
-            if seen > 0.8 * travel:
+            if shown > 0.8 * travel:
                 ax.axhline(side * travel, color=GREY, linestyle=":", linewidth=1.0)
-    if seen > 0.8 * travel:
+    if shown > 0.8 * travel:
         row[0].text(0.0, travel, "end of travel", va="bottom", fontsize=7.5, color=GREY)
 
 
 @styled
-def chances_figure(told: Mapping[str, Mapping[str, float]], came: Mapping[str, str]) -> Figure:
+def chances_figure(predicted: Mapping[str, Mapping[str, float]], measured: Mapping[str, str]) -> Figure:
     """Share of the rigs allowed that come to each end, one bar per pole set, with what came written beside."""
-    drawing = figure(0.42 * len(told) + 1.3)
+    drawing = figure(0.42 * len(predicted) + 1.3)
     ax: Any = drawing.subplots()
-    names = list(told)
+    names = list(predicted)
     left = np.zeros(len(names))
     for w in WORDS:
-        share = np.array([100 * told[n][w] for n in names])
+        share = np.array([100 * predicted[n][w] for n in names])
         colour, hatch = COLOURS[w]
         ax.barh(names, share, left=left, color=colour, hatch=hatch, edgecolor=BLACK, linewidth=0.6, label=w)
         left += share
     for i, n in enumerate(names):
-        if came.get(n):
-            ax.text(101.5, i, fill(f"measured: {came[n]}", 20), va="center", fontsize=8.5)
+        if measured.get(n):
+            ax.text(101.5, i, fill(f"measured: {measured[n]}", 20), va="center", fontsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 100)
     ax.grid(axis="y", visible=False)

@@ -1,7 +1,7 @@
 """Experiment 2: the rig held upright with the numbers it was identified by, and beforehand what will come of it.
 
 Gains come from the identified model, the verdict per pole set from the rigs that its covariance allows; then the law
-runs on the rig itself, here the twin's truth, and what came is put beside what was told.
+runs on the rig itself, here the twin's truth, and is compared with its prediction.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.basis import SIMULATED
+from upright.basis import SIMULATED, in_percent
 from upright.control import Score, Trial, score, trial
 from upright.control.preflight import STABILISED, Preflight, Task, preflight, word
 from upright.designing.run import SPEEDS, velocities
@@ -51,7 +51,7 @@ SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
 
 @dataclass(frozen=True, kw_only=True)
 class RegulationRequest:
-    """What is asked: poles by name [1/s], the way to the velocities, and the start (see `START` when None)."""
+    """Request: poles by name [1/s], the velocity estimator, and the start (see `START` when None)."""
 
     poles: Mapping[str, Roots] = field(default_factory=lambda: {n: read_poles(text) for n, text in SETS.items()})
     speed: str = "filtered"
@@ -81,7 +81,7 @@ class Came:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Attempt:
-    """One pole set: gains, what was told beforehand, and what came of it; None where nothing was run."""
+    """One pole set: gains, prediction, and measurement (None where nothing was run)."""
 
     name: str
     placement: Placement
@@ -134,12 +134,12 @@ class Regulation:
     truth : Rig or None
         The twin on which the laws ran, where it was one that is simulated here.
     task : Task
-    wish : Wish
+    request : RegulationRequest
     attempts : tuple of Attempt
     ways : tuple of Way
         For the recommended set, on the truth, or on the model where there is no truth.
     uncertain : bool
-        Whether the identification told of its uncertainty.
+        Whether the identification has a covariance.
     source : str
         What `upright regulate` is given to do this again.
     seed : int
@@ -153,7 +153,7 @@ class Regulation:
     rig: Rig
     truth: Rig | None
     task: Task
-    wish: RegulationRequest
+    request: RegulationRequest
     attempts: tuple[Attempt, ...]
     ways: tuple[VelocityRun, ...]
     uncertain: bool
@@ -180,7 +180,7 @@ class Regulation:
 
 def _rank(a: Attempt) -> tuple[float, ...]:
     b = a.before
-    sure = (b.words[STABILISED], b.quiet_chance, b.chance)
+    sure = (b.words[STABILISED], b.quiet_share, b.share)
     return (*(round(share, 2) for share in sure), -round(b.rest_rms, 2), b.push)
 
 
@@ -202,25 +202,25 @@ def _check_upright(known: Rig) -> None:
 
 
 def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
-    """What is asked of a rig when nobody says.
+    """Default request for a rig.
 
     The pole sets of Table 1 are for the makers' rigs; for one of one's own all are as much faster as it falls faster.
     """
     if stand.simulated:
         return RegulationRequest()
     tilt, push = BY_HAND
-    asked = RegulationRequest(tilt=tilt, push=push, seconds=SECONDS_BY_HAND)
+    request = RegulationRequest(tilt=tilt, push=push, seconds=SECONDS_BY_HAND)
     if stand.make is not None:
-        return asked
-    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].plant)]
+        return request
+    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].rig.plant)]
     faster = falls[0] / falls[1]
-    return replace(asked, poles={f"{name} x{faster:.2g}": faster * p for name, p in asked.poles.items()})
+    return replace(request, poles={f"{name} x{faster:.2g}": faster * p for name, p in request.poles.items()})
 
 
 @one_thread()
 def run_regulation(
     rig: Rig, stand: TestStand | None, seed: int, folder: Path, progress: Progress = silent,
-    stopped: Callable[[], bool] = lambda: False, wish: RegulationRequest | None = None, source: str = "FIT",
+    stopped: Callable[[], bool] = lambda: False, request: RegulationRequest | None = None, source: str = "FIT",
     workers: Workers = HERE,
 ) -> Regulation:  # fmt: skip
     """Design for the rig as identified, say what will come, and run on the rig itself.
@@ -230,16 +230,16 @@ def run_regulation(
     rig : Rig
         As identified hanging, completed for a run.
     stand : TestStand, optional
-        The rig itself; without it nothing is run and only what is expected is told.
+        The rig itself; without it nothing is run, only predicted.
     seed : int
         Of the hand's errors and of the rigs drawn.
     folder : Path
         Takes the logs of the runs.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
         Asked after every set whether to stop there.
-    wish : RegulationRequest, optional
+    request : RegulationRequest, optional
         What `request_for` says of the stand when omitted.
     source : str
         How a command line would name the fit.
@@ -252,40 +252,40 @@ def run_regulation(
         When a run on a live rig did not begin.
     """
     began = time.perf_counter()
-    wish = wish or (RegulationRequest() if stand is None else request_for(stand, rig))
+    request = request or (RegulationRequest() if stand is None else request_for(stand, rig))
     _check_upright(rig)
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
-    tilt, push = (w if w is not None else s for w, s in zip((wish.tilt, wish.push), usual, strict=True))
-    task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=wish.seconds)
-    others = allowed(rig, wish.draws, seed)
+    tilt, push = (w if w is not None else s for w, s in zip((request.tilt, request.push), usual, strict=True))
+    task = Task(start=(0.0, 0.0, tilt, push), hand=(0.0, 0.0, *HAND), seconds=request.seconds)
+    others = allowed(rig, request.draws, seed)
     attempts: list[Attempt] = []
     interrupted = False
-    for i, (name, poles) in enumerate(wish.poles.items()):
-        whole = len(wish.poles) + 1
+    for i, (name, poles) in enumerate(request.poles.items()):
+        whole = len(request.poles) + 1
         tell = part(progress, i / whole, (i + 1) / whole, f"regulating with {name}")
         tell("designing", 0.0)
-        foreseen = _foreseen(name, poles, rig, model, sampled, task, others, wish, seed, workers, tell)
+        foreseen = _foreseen(name, poles, rig, model, sampled, task, others, request, seed, workers, tell)
         came = None if stand is None else _came(stand, foreseen, task, seed, folder)
         attempts.append(replace(foreseen, came=came))
         if stopped():
             interrupted = True
             break
-    done = Regulation(
-        rig=rig, truth=stand.rig if stand is not None and stand.simulated else None, task=task, wish=wish,
+    result = Regulation(
+        rig=rig, truth=stand.rig if stand is not None and stand.simulated else None, task=task, request=request,
         attempts=tuple(attempts), ways=(), uncertain=bool(rig.draws), source=source, seed=seed,
         performed=SIMULATED if stand is None or not any(a.came for a in attempts) else stand.performed,
         interrupted=interrupted,
     )  # fmt: skip
-    progress("comparing the ways to the velocities", len(wish.poles) / (len(wish.poles) + 1))
-    ways = () if interrupted else tuple(_ways(done, model, sampled))
-    for a in done.attempts:
+    progress("comparing the ways to the velocities", len(request.poles) / (len(request.poles) + 1))
+    ways = () if interrupted else tuple(_ways(result, model, sampled))
+    for a in result.attempts:
         if a.after is not None:
             folder.mkdir(parents=True, exist_ok=True)
             a.after.record.to_csv(folder / f"{_stem(a)}.csv")
-    return replace(done, ways=ways, seconds=time.perf_counter() - began)
+    return replace(result, ways=ways, seconds=time.perf_counter() - began)
 
 
 def _stem(attempt: Attempt) -> str:
@@ -299,25 +299,26 @@ def actual_start(task: Task, seed: int) -> Array:
 
 def _foreseen(
     name: str, poles: Roots, rig: Rig, model: StateSpace, sampled: StateSpace, task: Task,
-    others: Mapping[str, Array], wish: RegulationRequest, seed: int, workers: Workers, progress: Progress,
+    others: Mapping[str, Array], request: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
     placed = place(model.A, model.B, poles)
-    law = feedback(velocities(model, sampled, wish.speed, wish.memory, rig.limit, rig.resolution), placed.K)
-    told = preflight(
-        rig, model, sampled, law, task, parameters=others, lanes=wish.draws, seed=seed, workers=workers,
+    law = feedback(velocities(model, sampled, request.speed, request.memory, rig.limit, rig.resolution), placed.K)
+    predicted = preflight(
+        rig, model, sampled, law, task, parameters=others, lanes=request.draws, seed=seed, workers=workers,
         progress=progress,
     )  # fmt: skip
-    return Attempt(name=name, placement=placed, law=law, before=told, came=None)
+    return Attempt(name=name, placement=placed, law=law, before=predicted, came=None)
 
 
 def _came(stand: TestStand, foreseen: Attempt, task: Task, seed: int, folder: Path) -> Came | None:
     """The law of an attempt on the rig; None where it is too likely that a live pendulum falls."""
-    chance = foreseen.before.chance
-    if not stand.simulated and chance < AT_LEAST:
+    share, basis = foreseen.before.share, foreseen.before.basis
+    if not stand.simulated and share < AT_LEAST:
         return None
     driven, pendulum = stand.names
     stand.ask(
-        f"Next is {foreseen.name}, predicted probability of stabilisation {100 * chance:.0f} %. Let {pendulum} hang at "
+        f"Next is {foreseen.name}, predicted probability of stabilisation "
+        f"{basis.supported(in_percent(share))}. Let {pendulum} hang at "
         f"rest; after a small pulse bring it up with {driven} in the middle of its travel, hold both there until the "
         "loop takes them, and let go."
     )
@@ -327,27 +328,29 @@ def _came(stand: TestStand, foreseen: Attempt, task: Task, seed: int, folder: Pa
 
 def scored(run: StandRun) -> Came:
     """A run with its figures; one that a supervisor ended before anything could hit was lost there."""
-    found = score(run.trial)
+    figures = score(run.trial)
     if run.ended:
         end = float(run.trial.t[-1])
         lost = {"ran_out": end} if run.overtravel else {"fell": end}
-        found = replace(found, settled=math.inf, **lost)
-    return Came(trial=run.trial, score=found, ended=run.ended)
+        figures = replace(figures, settled=math.inf, **lost)
+    return Came(trial=run.trial, score=figures, ended=run.ended)
 
 
-def _ways(done: Regulation, model: StateSpace, sampled: StateSpace) -> list[VelocityRun]:
-    on, K = done.truth or done.rig, done.best.placement.K
-    driven = model.to_sampled(sampled.period, sampled.delay, done.rig.lag)
+def _ways(result: Regulation, model: StateSpace, sampled: StateSpace) -> list[VelocityRun]:
+    on, K = result.truth or result.rig, result.best.placement.K
+    driven = model.to_sampled(sampled.period, sampled.delay, result.rig.lag)
     out: list[VelocityRun] = []
     for speed in SPEEDS:
-        way = velocities(model, sampled, speed, done.wish.memory, done.rig.limit, done.rig.resolution)
+        way = velocities(model, sampled, speed, result.request.memory, result.rig.limit, result.rig.resolution)
         law = feedback(way, K)
         stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
-        went = trial(on, law, at=done.task.at, start=actual_start(done.task, done.seed), seconds=done.task.seconds)
+        went = trial(
+            on, law, at=result.task.at, start=actual_start(result.task, result.seed), seconds=result.task.seconds
+        )
         out.append(
             VelocityRun(
                 name=way.name,
-                noise=command_noise(driven, law, done.rig.resolution) if stands else None,
+                noise=command_noise(driven, law, result.rig.resolution) if stands else None,
                 margins=margins(driven, law) if stands else None,
                 run=went,
                 score=score(went),

@@ -27,12 +27,12 @@ def fit_study(path: Path, progress: Progress) -> tuple[Study, Fit]:
 
 def fit_chapter(study: Study, fit: Fit, folder: Path, truth: Mapping[str, float]) -> Chapter:
     """As `upright identify` tells it, its numbers on the cover too, beside the `truth` where a twin tells it."""
-    told = chapter(fit, title=study.title, provenance=study.provenance, study=typed(study.path), folder=typed(folder))
+    page = chapter(fit, title=study.title, provenance=study.provenance, study=typed(study.path), folder=typed(folder))
     numbers = {n: {**plain_estimate(e), "unit": e.unit, "status": e.status} for n, e in fit.estimates.items()}
-    found = tuple(
+    findings = tuple(
         finding(Symbol(f"{n} [{unit(e.unit)}]" if unit(e.unit) else n), e, truth.get(n))
         for n, e in fit.estimates.items() if e.status != "known" and n in fit.model.parameters
     )  # fmt: skip
     return replace(
-        told, findings=found, numbers={"trusted": fit.trusted, "verdict": fit.verdict, "parameters": numbers}
+        page, findings=findings, numbers={"trusted": fit.trusted, "verdict": fit.verdict, "parameters": numbers}
     )

@@ -35,7 +35,7 @@ def nobody_watches() -> AbstractContextManager[Watch]:
 
 
 def nobody(_sentence: str) -> bool:
-    """Hands of a twin: what a person would be asked for is done already."""
+    """Hands of a twin: what a person would do is done already."""
     return True
 
 
@@ -47,7 +47,7 @@ class LiveStand(TestStand):
     ----------
     file : RigFile
     person : callable
-        Asked for something, in a sentence; answers whether it was done.
+        Called with a request, in a sentence; answers whether it was done.
     watching : callable
         Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
     accept : str
@@ -62,7 +62,7 @@ class LiveStand(TestStand):
 
     @property
     def text(self) -> str:
-        """What is said of it: RIG.toml, and what describes the rig."""
+        """Its description: RIG.toml, and what describes the rig."""
         known = self.file.known
         return read_text(self.file.path) + ("" if known is None else read_text(known))
 
@@ -76,7 +76,7 @@ class LiveStand(TestStand):
     def ask(self, sentence: str) -> None:
         """Ask the person beside it; see `TestStand.ask`."""
         if not self.person(sentence):
-            raise RigStopped(f"This was asked for and not done: {sentence}")
+            raise RigStopped(f"This was requested and not done: {sentence}")
 
     def run(
         self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0
@@ -86,10 +86,10 @@ class LiveStand(TestStand):
             rig=self.file.path, samples=tuple(samples), seconds=len(samples) * self.rig.period, tilt=lifted,
             bolted=bolted, check=False, watch=False, stem=stem,
         )  # fmt: skip
-        done = self._run(request, folder)
-        if done.end.stopped:
-            raise RigStopped(done.end.stopped)
-        return read(done.log_path)
+        result = self._run(request, folder)
+        if result.end.stopped:
+            raise RigStopped(result.end.stopped)
+        return read(result.log_path)
 
     def hold(
         self, law: Law | Rule, at: str, folder: Path, stem: str, seconds: float, *, start: Array | None = None,
@@ -109,21 +109,21 @@ class LiveStand(TestStand):
             tilt=0.0 if start is None else float(start[-2]), from_rest=from_rest,
             accept=self.accept,
         )  # fmt: skip
-        done = self._run(request, folder)
-        if done.log is None or len(done.log) < 3:
-            raise RigStopped(done.end.stopped)
+        result = self._run(request, folder)
+        if result.log is None or len(result.log) < 3:
+            raise RigStopped(result.end.stopped)
         origin = None
         if from_rest:  # its law counts from where the encoders were zeroed, wherever the pulse has left the rig
             held, zero = (self.rig.plant.equilibrium(n) for n in (at, self.resting))
             origin = [held[n] - zero[n] for n in held]
-        return run_of(done, at, origin)
+        return run_of(result, at, origin)
 
     def _run(self, request: RunRequest, folder: Path) -> RigRun:
         with self.watching() as watch:
-            done = run_rig(request, folder, watch=watch)
-        if done.end.faults & Fault.STOP:
+            result = run_rig(request, folder, watch=watch)
+        if result.end.faults & Fault.STOP:
             raise KeyboardInterrupt
-        return done
+        return result
 
     def described_by(self, fit: Path, folder: Path) -> LiveStand:
         """The same rig described by a fit; its RIG.toml is written to the folder as ``rig.toml``."""
@@ -148,22 +148,22 @@ def pushed(law: Law | Rule, reference: Array | None, pushes: Array | None) -> La
     return replace(law, B=B, D=D, references=np.column_stack([reference, pushes]), reference_names=names)
 
 
-def run_of(done: RigRun, at: str, origin: Sequence[float] | None = None) -> StandRun:
+def run_of(result: RigRun, at: str, origin: Sequence[float] | None = None) -> StandRun:
     """A logged run about an equilibrium, its time from where the loop began: states are the readings and their
     differences, counted from what was held, or from the readings of an origin.
     """
-    assert done.log is not None
-    t, away = done.t, done.away
+    assert result.log is not None
+    t, away = result.t, result.away
     if origin is not None:
-        away = away + np.subtract(done.end.target, origin)
+        away = away + np.subtract(result.end.target, origin)
     x = np.empty((t.size, 2 * away.shape[1]))
-    point = np.array(list(done.model.plant.equilibrium(at).values()))
+    point = np.array(list(result.model.plant.equilibrium(at).values()))
     x[:, 0::2], x[:, 1::2] = away + point, np.gradient(away, t, axis=0)
-    signals = {c.name: x[:, 2 * i] for i, c in enumerate(done.model.plant.coordinates)}
-    record = done.log.record()
+    signals = {c.name: x[:, 2 * i] for i, c in enumerate(result.model.plant.coordinates)}
+    record = result.log.record()
     shown = record.replace(t=t, signals={n: signals.get(n, v) for n, v in record.signals.items()})
-    trial = Trial(rig=done.model, at=at, t=t, x=x, u=done.log.columns[APPLIED], rest=point, record=shown)
-    return StandRun(trial=trial, ended=done.end.stopped, overtravel=bool(done.end.faults & Fault.OVERTRAVEL))
+    trial = Trial(rig=result.model, at=at, t=t, x=x, u=result.log.columns[APPLIED], rest=point, record=shown)
+    return StandRun(trial=trial, ended=result.end.stopped, overtravel=bool(result.end.faults & Fault.OVERTRAVEL))
 
 
 def live_stand(
@@ -180,9 +180,7 @@ def live_stand(
     library()
     file = read_rig_file(path)
     if file.performed == REPLAYED:
-        raise BadInput(
-            f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
-        )
+        raise BadInput(f'{path}: a replay does not answer commands; experiments need a rig or kind = "twin".')
     rig, truth = described(file)
     units = {c.name: c.unit for c in rig.plant.coordinates}
     limits = file.limits(units, rig.unit, usual_limits(rig))

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from upright.experiments.stand.known import Known, asked, bench
+from upright.experiments.stand.known import Known, bench, model_of
 from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.files import read_text, replace_file
 from upright.quantities import with_unit
@@ -37,23 +37,23 @@ def write_study(
     drive : bool
         Whether something drove; what stands between command and force is otherwise left as it is guessed.
     """
-    said = _said(stand, path.parent)
+    tables_of_rig = _tables_of(stand, path.parent)
     units = {k.name: stand.rig.plant.quantity(k.name).unit for k in known}
-    found = {
+    numbers = {
         k.name: {"value": with_unit(k.value, units[k.name], 10), "uncertainty": with_unit(k.stderr, units[k.name], 4)}
         for k in known
     }
-    parameters = said.get("parameters", {}) | found
+    parameters = tables_of_rig.get("parameters", {}) | numbers
     written = table("[parameters]")
     for name, value in parameters.items():
         written.key(name, value)
     tables: list[TomlTable] = [
         table("", title=title, source=f"logs of {stand.rig.name}"),
-        table("[rig]", digits=10, **({"servo_period": f"{stand.rig.period:.10g} s"} | said["rig"])),
+        table("[rig]", digits=10, **({"servo_period": f"{stand.rig.period:.10g} s"} | tables_of_rig["rig"])),
         written,
     ]
     if drive:
-        tables += [table("[actuator]", digits=10, **_late(stand, said.get("actuator", {}))),
+        tables += [table("[actuator]", digits=10, **_late(stand, tables_of_rig.get("actuator", {}))),
                    table("[drive]", column=APPLIED, unit=stand.rig.unit)]  # fmt: skip
     for c, per in zip(stand.rig.plant.coordinates, stand.rig.per_unit, strict=True):
         counts = {"counts_per_rev": per * 2 * math.pi} if c.unit == "rad" else {"counts_per_m": per}
@@ -64,14 +64,14 @@ def write_study(
 
 
 def _late(stand: TestStand, actuator: Mapping[str, Any]) -> dict[str, Any]:
-    """The drive with its delay: a sample where nobody said it, and found where nothing else is late."""
+    """The drive with its delay: a sample where not specified, and estimated where nothing else is late."""
     if "delay" in actuator or not stand.rig.delay:
         return dict(actuator)
     assumed = f"{stand.rig.delay:.10g} s"
     return {**actuator, "delay": assumed if "lag" in actuator else {"guess": assumed, "min": 0}}
 
 
-def _said(stand: TestStand, folder: Path) -> Tables:
+def _tables_of(stand: TestStand, folder: Path) -> Tables:
     """Tables of the owner's study, a plant of his own still found from where the new one lies."""
     source = stand.study
     if source is None:
@@ -87,13 +87,13 @@ def _said(stand: TestStand, folder: Path) -> Tables:
 def _of_make(stand: TestStand) -> Tables:
     """What the maker designed, and what the bench says of this twin."""
     make = make_of(stand.rig.plant)
-    start = asked(make, bench(stand.twin, make), make.bench)
+    start = model_of(make, bench(stand.twin, make), make.bench)
     values: Tables = {"parameters": {}, "actuator": {}}
     for name, p in start.parameters.items():
         where, _, key = name.rpartition(".")
-        told = with_unit(p.value, p.unit, 10)
-        entry: Any = {"guess": told, "min": 0} if p.estimate else told
+        value = with_unit(p.value, p.unit, 10)
+        entry: Any = {"guess": value, "min": 0} if p.estimate else value
         if p.uncertainty:
-            entry = {"value": told, "uncertainty": with_unit(p.uncertainty, p.unit, 4)}
+            entry = {"value": value, "uncertainty": with_unit(p.uncertainty, p.unit, 4)}
         values[where or "parameters"][key] = entry
     return {"rig": {"plant": make.plant_name, "vendor": make.vendor}, **values}

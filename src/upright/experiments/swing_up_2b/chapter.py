@@ -1,4 +1,4 @@
-"""Experiment 2b as a chapter: the encoders, the way up, and what lying encoders would have done."""
+"""Experiment 2b as a chapter: the encoders, the way up, and what faulty encoders would have done."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from upright.control.sensors import Scales
 from upright.control.swing_up import Ascent
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
+from upright.laws import as_values
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, percent
 from upright.report.symbols import unit as raised
@@ -21,34 +22,36 @@ QUESTION = (
 )
 
 
-def chapter(done: SwingUpRun) -> Chapter:
+def chapter(result: SwingUpRun) -> Chapter:
     """Sensors, swing-up, lies; as far as the experiment has them."""
-    source = "numbers identified hanging" if done.source else "the numbers of the make as designed"
-    seed = "" if done.truth is done.model else f", seed {done.truth.seed}"
-    parts = [_sensor_part(done.model, done.check)]
-    if done.ascent is not None:
-        parts.append(_swing_part(done, done.ascent))
-    if done.lies:
-        parts.append(_lie_part(done))
-    told = Chapter(
-        key="2b", title=f"Swing-up and catch: {done.truth.name}{seed}", question=QUESTION,
-        verdict=done.verdict, detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
-        sound=done.caught, parts=tuple(parts), steps=_steps(done), findings=_findings(done), numbers=_numbers(done),
+    source = "numbers identified hanging" if result.source else "the nominal numbers of the rig model"
+    seed = "" if result.truth is result.model else f", seed {result.truth.seed}"
+    parts = [_sensor_part(result.model, result.check)]
+    if result.ascent is not None:
+        parts.append(_swing_part(result, result.ascent))
+    if result.lies:
+        parts.append(_lie_part(result))
+    page = Chapter(
+        key="2b", title=f"Swing-up and catch: {result.truth.name}{seed}", question=QUESTION,
+        verdict=result.verdict,
+        detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
+        sound=result.sound, parts=tuple(parts), steps=_steps(result), findings=_findings(result),
+        numbers=_numbers(result),
     )  # fmt: skip
-    return resting_on(told, done.model.basis, done.performed)
+    return resting_on(page, result.model.basis, result.performed)
 
 
 def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
     """What a log of a hanging rig says of its encoders, by itself."""
-    again = Step("Mend what is said above, log the hanging rig again, and check again.")
+    again = Step("Mend what is reported above, log the hanging rig again, and check again.")
     onward = Step("The encoders may be trusted: find the gains that hold the rig.",
                   f"upright regulate {source}")  # fmt: skip
-    told = Chapter(
+    page = Chapter(
         key="2b", title=f"Encoders of {model.name} in {log}", question="Do the encoders show what is true?",
         verdict=check.verdict, sound=check.sound, parts=(_sensor_part(model, check),),
         steps=(onward if check.sound else again,), numbers={"sensors": _scales(check), "verdict": check.verdict},
     )  # fmt: skip
-    return resting_on(told, model.basis)
+    return resting_on(page, model.basis)
 
 
 def _scales(check: Scales) -> dict[str, Any]:
@@ -80,23 +83,24 @@ def _sensor_part(model: Rig, check: Scales) -> Part:
     return Part("Encoders, before a loop is closed", (Points((check.verdict,)), how, table, swings))
 
 
-def _swing_part(done: SwingUpRun, run: Ascent) -> Part:
+def _swing_part(result: SwingUpRun, run: Ascent) -> Part:
     """The way up."""
-    law = done.law
-    unit = raised(done.model.plant.coordinates[0].unit)
+    law = result.law
+    unit = raised(result.model.plant.coordinates[0].unit)
     rows = (
         ("upright for good after", number(run.up, 3) if math.isfinite(run.up) else "never", "s"),
         ("half swings before the first handover", str(run.swings), ""),
         ("handovers, falls", f"{len(run.handovers)}, {len(run.falls)}", ""),
-        ("largest command, of its limit", f"{run.peak:.3g} of {law.limit:.3g}", done.model.unit),
+        ("largest command, of its limit", f"{run.peak:.3g} of {law.limit:.3g}", result.model.unit),
         ("share of the time at the limit", percent(100 * run.saturated), ""),
+        *(() if result.rest is None else (("command at rest, rms, of the limit", percent(100 * result.rest.rms), ""),)),
         ("farthest from the middle, of the travel", f"{run.travel:.3g} of {law.travel:.3g}", unit),
         ("ellipsoid of the catch, of what the linear model allows", percent(100 * law.size / law.sure), ""),
     )
     return Part(
         "Swing-up and catch",
         (
-            done.verdict,
+            result.verdict,
             "The pivot is accelerated along with the swing, by less as the energy comes near that of upright; a spring "
             "and a damper keep it in the middle. The feedback takes over inside an ellipsoid x'Px from which a "
             "least-cost loop returns although the command saturates.",
@@ -105,7 +109,7 @@ def _swing_part(done: SwingUpRun, run: Ascent) -> Part:
                 name="ascent", draw=lambda: ascent_figure(run),
                 caption="Angle, energy about the hinge, command and driven body as logged. Shaded: the feedback "
                 "holds.",
-                description=done.verdict,
+                description=result.verdict,
             ),
             Picture(
                 name="portrait", draw=lambda: portrait_figure(run),
@@ -117,73 +121,83 @@ def _swing_part(done: SwingUpRun, run: Ascent) -> Part:
     )  # fmt: skip
 
 
-def _lie_part(done: SwingUpRun) -> Part:
-    """Lying encoders, tried one by one."""
-    rows = tuple(_row(lie) for lie in done.lies)
-    caught = sum(lie.refused for lie in done.lies)
-    falling = [lie for lie in done.lies if math.isfinite(lie.fell)]
+def _lie_part(result: SwingUpRun) -> Part:
+    """Faulty encoders, tried one by one."""
+    rows = tuple(_row(lie) for lie in result.lies)
+    caught = sum(lie.refused for lie in result.lies)
+    falling = [lie for lie in result.lies if math.isfinite(lie.fell)]
     in_time = sum(lie.spoke < lie.fell for lie in falling)
     table = Table(
         caption="Encoders that show a multiple of what is true", rows=rows, numbers=(1, 2, 3, 4, 6),
         headings=("coordinate", "lie", "found hanging", "watch speaks [ms]", "at [°]", "and says", "fall [ms]"),
     )  # fmt: skip
-    told = (
-        f"Hanging, {caught} of {len(done.lies)} lies are found before a loop is closed. "
+    sentence = (
+        f"Hanging, {caught} of {len(result.lies)} lies are found before a loop is closed. "
         f"A loop started {math.degrees(TILT):.0f} degrees from upright falls with {len(falling)} of them; a watch "
         f"beside it switches off before the fall in {in_time} cases."
     )
-    return Part("If an encoder lied", (Points((told,)), table))
+    return Part("If an encoder were faulty", (Points((sentence,)), table))
 
 
 def _row(lie: Lie) -> tuple[str, ...]:
     spoke = math.isfinite(lie.spoke)
     return (
-        lie.name, f"{lie.factor:g}".replace("-", "−"), number(lie.found, 4), f"{1e3 * lie.spoke:.0f}" if spoke else "–",
-        number(math.degrees(lie.tilt), 2) if spoke else "–", lie.said or "–",
+        lie.name, f"{lie.factor:g}".replace("-", "−"), number(lie.estimate, 4),
+        f"{1e3 * lie.spoke:.0f}" if spoke else "–",
+        number(math.degrees(lie.tilt), 2) if spoke else "–", lie.suspicion or "–",
         f"{1e3 * lie.fell:.0f}" if math.isfinite(lie.fell) else "stands",
     )  # fmt: skip
 
 
-def _findings(done: SwingUpRun) -> tuple[KeyNumber, ...]:
+def _findings(result: SwingUpRun) -> tuple[KeyNumber, ...]:
     """Numbers for the cover."""
-    run = done.ascent
-    if run is None or not done.caught:
+    run = result.ascent
+    if run is None or not result.caught:
         return (KeyNumber(what="swing-up", value="no"),)
     return (
         KeyNumber(what="from hanging to upright", value=f"{number(run.up, 3)} s"),
-        KeyNumber(what="largest command of the swing-up", value=f"{number(run.peak, 3)} {done.model.unit}"),
+        KeyNumber(what="largest command of the swing-up", value=f"{number(run.peak, 3)} {result.model.unit}"),
     )
 
 
-def _steps(done: SwingUpRun) -> tuple[Step, ...]:
+def _steps(result: SwingUpRun) -> tuple[Step, ...]:
     """What to do next."""
-    base = f"upright swing-up {done.source or f'--rig {make_of(done.truth.plant).key}'} --seed {done.truth.seed}"
-    if not done.check.sound:
+    base = f"upright swing-up {result.source or f'--rig {make_of(result.truth.plant).key}'} --seed {result.truth.seed}"
+    if not result.check.sound:
         return (Step("Mend the encoder, then try again.", base),)
     out = [Step("See what happens when an encoder lies.", f'{base} --lie "theta=2"')]
-    if not done.caught:
-        out.append(Step("Allow more travel.", f"{base} --travel {2 * done.law.travel:g}"))
-    if not done.source:
+    if not result.caught:
+        out.append(Step("Allow more travel.", f"{base} --travel {2 * result.law.travel:g}"))
+    else:
+        out.append(Step("Take the law to the computer that closes the loop, in C, for Arduino or in Python.",
+                        "upright export FOLDER/swing_up.json --to c"))  # fmt: skip
+    if not result.source:
         out.append(Step("Design from an identification instead of the data sheet.",
-                        f"upright swing-up FIT.json --seed {done.truth.seed}"))  # fmt: skip
+                        f"upright swing-up FIT.json --seed {result.truth.seed}"))  # fmt: skip
     return tuple(out)
 
 
-def _numbers(done: SwingUpRun) -> dict[str, Any]:
+def _numbers(result: SwingUpRun) -> dict[str, Any]:
     """The same as plain values."""
-    run, law = done.ascent, done.law
+    run, law = result.ascent, result.law
     up = None if run is None else {
-        "upright_after": run.up, "held": done.caught, "half_swings": run.swings,
+        "upright_after": run.up, "held": result.caught, "half_swings": run.swings,
         "handovers": run.handovers, "falls": run.falls, "tripped": run.tripped,
         "peak_command": run.peak, "share_saturated": run.saturated, "travel": run.travel,
+        "rest": None if result.rest is None else {"quiet": result.rest.quiet, **vars(result.rest)},
     }  # fmt: skip
+    rig = result.model
     return {
-        "rig": done.truth.name, "seed": done.truth.seed, "verdict": done.verdict,
-        "sensors": _scales(done.check), "swing_up": up,
+        "rig": result.truth.name, "seed": result.truth.seed, "verdict": result.verdict,
+        "sensors": _scales(result.check), "swing_up": up,
+        "rule": as_values(law.rule(rig, rig.plant.state(next(iter(rig.plant.equilibria))))),
+        "period": rig.period, "limit": law.limit,
+        "command_unit": rig.unit, "described": rig.hardware.plain(),
+        "readings": [{"name": c.name, "unit": c.unit} for c in rig.plant.coordinates],
         "law": {
             "K": law.K, "P": law.P, "size": law.size, "sure": law.sure, "reach": law.reach,
             "limit": law.limit, "travel": law.travel, "held_for": HELD, "body": vars(law.body),
         },
-        "lies": [vars(lie) for lie in done.lies],
-        "lies_tried": len(LIES) if done.lies else 0,
+        "lies": [vars(lie) for lie in result.lies],
+        "lies_tried": len(LIES) if result.lies else 0,
     }  # fmt: skip

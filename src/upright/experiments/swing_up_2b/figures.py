@@ -33,12 +33,12 @@ def ascent_figure(run: Ascent, *, after: float = 2.5) -> Figure:
     """Angle, energy, command and driven body up to `after` seconds of holding; holding is shaded."""
     trial, rig = run.trial, run.trial.rig
     last = min(float(trial.t[-1]), (run.up if np.isfinite(run.up) else float(trial.t[-1])) + after)
-    seen = trial.t <= last
-    t = trial.t[seen]
+    shown = trial.t <= last
+    t = trial.t[shown]
     drawing = figure(6.0, margins=(0.75, 0.1, 0.1, 0.5))
     axes: list[Any] = drawing.subplots(4, 1, sharex=True, gridspec_kw={"height_ratios": [1.3, 1.3, 1, 1]}).tolist()
     name, unit = rig.plant.coordinates[0].name, rig.plant.coordinates[0].unit
-    degrees = np.degrees(trial.record["theta"][seen])
+    degrees = np.degrees(trial.record["theta"][shown])
     axes[0].plot(*decimated(t, degrees), color=BLUE)
     for turn in np.arange(np.floor(degrees.min() / 360), np.ceil(degrees.max() / 360) + 1) * 360 + 180:
         if degrees.min() - 40 < turn < degrees.max() + 40:
@@ -47,20 +47,20 @@ def ascent_figure(run: Ascent, *, after: float = 2.5) -> Figure:
     axes[0].margins(y=0.1)
     axes[0].set_ylabel("angle θ [°]")
     low = 2 * run.law.body.weight
-    axes[1].plot(*decimated(t, 1e3 * run.energy[seen]), color=GREEN)
+    axes[1].plot(*decimated(t, 1e3 * run.energy[shown]), color=GREEN)
     axes[1].axhline(0.0, color=GREY, linestyle="--", linewidth=0.9)
     axes[1].text(last, 0.0, "upright at rest ", ha="right", va="bottom", fontsize=7.5, color=GREY)
     axes[1].axhline(-1e3 * low, color=GREY, linestyle=":", linewidth=0.9)
     axes[1].text(last, -1e3 * low, "hanging at rest ", ha="right", va="bottom", fontsize=7.5, color=GREY)
     axes[1].set_ylabel("energy [mJ]")
-    axes[2].plot(*decimated(t, trial.u[seen]), color=VERMILLION, linewidth=0.9)
-    _limits(axes[2], rig.limit, float(np.abs(trial.u[seen]).max()), "limit", last)
+    axes[2].plot(*decimated(t, trial.u[shown]), color=VERMILLION, linewidth=0.9)
+    _limits(axes[2], rig.limit, float(np.abs(trial.u[shown]).max()), "limit", last)
     axes[2].set_ylabel(axis("command", rig.unit))
-    axes[3].plot(*decimated(t, trial.record[name][seen]), color=BLUE)
-    _limits(axes[3], run.law.travel, float(np.abs(trial.x[seen, 0]).max()), "travel", last)
+    axes[3].plot(*decimated(t, trial.record[name][shown]), color=BLUE)
+    _limits(axes[3], run.law.travel, float(np.abs(trial.x[shown, 0]).max()), "travel", last)
     axes[3].set_ylabel(axis(mathtext(name), unit))
     for ax in axes:
-        for begin, end in _stretches(run.mode[seen] == HOLDING):
+        for begin, end in _stretches(run.mode[shown] == HOLDING):
             ax.axvspan(t[begin], t[end], color=ORANGE, alpha=0.14, linewidth=0)
     hide_inner_times(axes)
     drawing.align_ylabels(axes)
@@ -118,14 +118,14 @@ def _broken(angle: Array, speed: Array) -> tuple[Array, Array]:
 
 
 @styled
-def check_figure(found: Scales, units: tuple[str, ...]) -> Figure:
+def check_figure(scales: Scales, units: tuple[str, ...]) -> Figure:
     """What the encoders of the hanging rig showed, and the model's motion times the scales found."""
-    drawing = figure(1.4 * len(found.names) + 1.0, margins=(0.75, 0.1, 0.1, 0.5))
-    axes: list[Any] = drawing.subplots(len(found.names), 1, sharex=True, squeeze=False)[:, 0].tolist()
-    for i, (ax, name, unit) in enumerate(zip(axes, found.names, units, strict=True)):
-        ax.plot(found.t, found.shown[:, i], color=BLUE, linewidth=2.6, alpha=0.45, label="shown")
-        label = f"model × {found.value[i]:.4g}"
-        ax.plot(found.t, found.motion[:, i], color="black", linestyle="--", linewidth=0.9, label=label)
+    drawing = figure(1.4 * len(scales.names) + 1.0, margins=(0.75, 0.1, 0.1, 0.5))
+    axes: list[Any] = drawing.subplots(len(scales.names), 1, sharex=True, squeeze=False)[:, 0].tolist()
+    for i, (ax, name, unit) in enumerate(zip(axes, scales.names, units, strict=True)):
+        ax.plot(scales.t, scales.shown[:, i], color=BLUE, linewidth=2.6, alpha=0.45, label="shown")
+        label = f"model × {scales.value[i]:.4g}"
+        ax.plot(scales.t, scales.motion[:, i], color="black", linestyle="--", linewidth=0.9, label=label)
         ax.set_ylabel(axis(mathtext(name), unit))
         ax.margins(y=0.22)  # room for the names of the curves
         ax.legend(loc="upper right", ncols=2)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from upright.basis import SIMULATED
+from upright.control.effort import QUIET_RMS, of_limit
 from upright.experiments.tracking_3 import tables
 from upright.experiments.tracking_3.figures import (
     RootLocus,
@@ -29,53 +30,62 @@ from upright.report.page import Chapter, KeyNumber, Part, Picture, Step, Table, 
 from upright.report.symbols import number, plain, typed
 
 
-def chapter(done: Tracking) -> Chapter:
+def chapter(result: Tracking) -> Chapter:
     """How the far end follows, and what it takes."""
-    near, far = (plain(done.model.plant.coordinates[i].name) for i in (0, -1))
-    parts = [*_data(done), _gains(done, far), _loop(done, near, far)]
-    if done.pd is not None:
-        parts.append(_friction(done, far))
-    if done.pd is not None and done.stiff is not None and done.far is not None:
-        parts.append(_why(done, done.pd, done.stiff, done.far, near, far))
-    ended = " It was interrupted; what was finished is told." if done.interrupted else ""
-    detail = "Foreseen on the fitted numbers; no rig was touched."
-    if done.found:
-        left = [o.law.name for o in done.outcomes if not o.tried]
-        detail = "Seen on the twin: no rig was touched." if done.simulated else "Tried on the rig."
+    near, far = (plain(result.model.plant.coordinates[i].name) for i in (0, -1))
+    parts = [*_data(result), _gains(result, far), _loop(result, near, far)]
+    if result.pd is not None:
+        parts.append(_friction(result, far))
+    if result.pd is not None and result.stiff is not None and result.far is not None:
+        parts.append(_why(result, result.pd, result.stiff, result.far, near, far))
+    ended = " It was interrupted; what was finished is reported." if result.interrupted else ""
+    detail = "Predicted with the fitted numbers; no rig was touched."
+    if result.tried:
+        left = [o.law.name for o in result.outcomes if not o.tried]
+        detail = "Seen on the twin: no rig was touched." if result.simulated else "Tried on the rig."
         if left:
-            detail = f"Tried on the rig, but for what is foreseen to leave the bounds: {', '.join(left)}."
-    told = Chapter(
+            detail = f"Tried on the rig, but for what is predicted to leave the bounds: {', '.join(left)}."
+    page = Chapter(
         key="3", title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
         "effort and the shaft's travel, and what does it take beyond PD control of its own end?",
-        verdict=_verdict(done), detail=detail + ended, sound=_sound(done), parts=tuple(parts), steps=_steps(done),
-        findings=_findings(done), numbers=_numbers(done),
+        verdict=_verdict(result), detail=detail + ended, sound=_sound(result), parts=tuple(parts), steps=_steps(result),
+        findings=_findings(result), numbers=_numbers(result),
     )  # fmt: skip
-    return resting_on(told, done.model.basis, done.performed if done.found else SIMULATED)
+    return resting_on(page, result.model.basis, result.performed if result.tried else SIMULATED)
 
 
-def _verdict(done: Tracking) -> str:
+def _verdict(result: Tracking) -> str:
     """What was learned, in a few sentences."""
-    best, bad, size = _strongest(done), [o for o in done.sets if not o.within], done.step.size
-    who = best.law.name if len(done.sets) == 1 else f"all {len(done.sets)} sets of poles"
-    head = f"A step of {length(done, size)} is followed by {who} within effort, travel and twist"
+    best, bad, size = _strongest(result), [o for o in result.sets if not o.within], result.step.size
+    who = best.law.name if len(result.sets) == 1 else f"all {len(result.sets)} sets of poles"
+    head = f"A step of {length(result, size)} is followed by {who} within effort, travel and twist"
     if bad:
-        head = f"A step of {length(done, size)} is too much for {', '.join(map(_beyond, bad))}"
+        head = f"A step of {length(result, size)} is too much for {', '.join(map(_beyond, bad))}"
     got, effort = best.measured.figures, percentage(best.measured.effort.share, 0)
     if got is None:
-        return f"{head}."
-    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
-    if done.pd is None or done.stiff is None or done.pd.measured.figures is None:
+        return f"{head}.{_busy(result)}"
+    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}.{_busy(result)}"
+    if result.pd is None or result.stiff is None or result.pd.measured.figures is None:
         return head
-    pd, stiff = done.pd.measured, done.stiff.measured.figures
+    pd, stiff = result.pd.measured, result.stiff.measured.figures
     swings = stiff is None or not math.isfinite(stiff.settling_5)
     slow = "does not settle" if stiff is None or swings else f"swings for {stiff.settling_5:.2g} s"
     return (
-        f"{head} A tuned PD of the near encoder {_arrives(done.pd.measured.figures.arrival)}, with "
+        f"{head} A tuned PD of the near encoder {_arrives(result.pd.measured.figures.arrival)}, with "
         f"{percentage(pd.effort.share, 0)} of the limit, but a push of the drive moves it by "
         f"{percentage(pd.give / size, 0)} of the step, {best.law.name} by "
         f"{percentage(best.measured.give / size, 0)}; made as stiff, the PD {slow}."
     )
+
+
+def _busy(result: Tracking) -> str:
+    """Sets whose command is excessive at rest, as a sentence after others."""
+    busy = [(o.law.name, o.measured.rest) for o in result.sets if o.measured.rest and not o.measured.rest.quiet]
+    if not busy:
+        return ""
+    rms = ", ".join(f"{of_limit(rest.rms)} with {name}" for name, rest in busy)
+    return f" At rest the effort is excessive: the command's rms is {rms} ({100 * QUIET_RMS:.0f} % is quiet)."
 
 
 def _beyond(o: Outcome) -> str:
@@ -89,23 +99,23 @@ def _arrives(arrival: float) -> str:
     return f"arrives in {milli(arrival)} s" if math.isfinite(arrival) else "never comes to stay within 5 %"
 
 
-def _sound(done: Tracking) -> bool:
-    """Whether every set stays within the limits and settles."""
-    settled = all(o.measured.figures is not None and math.isfinite(o.measured.figures.settling_5) for o in done.sets)
-    return settled and all(o.within for o in done.sets)
+def _sound(result: Tracking) -> bool:
+    """Whether every set stays within the limits, settles, and is quiet at rest."""
+    settled = all(o.measured.figures is not None and math.isfinite(o.measured.figures.settling_5) for o in result.sets)
+    return settled and all(o.within and o.quiet for o in result.sets)
 
 
-def _strongest(done: Tracking) -> Outcome:
+def _strongest(result: Tracking) -> Outcome:
     """The set with the largest prefilter."""
-    return max(done.sets, key=lambda o: o.law.k_pf)
+    return max(result.sets, key=lambda o: o.law.k_pf)
 
 
-def _findings(done: Tracking) -> tuple[KeyNumber, ...]:
-    best, out = _strongest(done), []
-    poles = [] if done.fit is None else [p.imag for at in done.fit.poles.values() for p in at]
+def _findings(result: Tracking) -> tuple[KeyNumber, ...]:
+    best, out = _strongest(result), []
+    poles = [] if result.fit is None else [p.imag for at in result.fit.poles.values() for p in at]
     swing = max(poles, key=lambda e: e.value, default=None)
     if swing is not None and swing.value > 0:
-        out.append(finding("flexible mode [rad/s]", swing, float(max(done.true.linear(AT).poles().imag))))
+        out.append(finding("flexible mode [rad/s]", swing, float(max(result.true.linear(AT).poles().imag))))
     f = best.measured.figures
     if f is not None:
         out.append(KeyNumber(what=f"{best.law.name}: arrival within 5 % [s]", value=milli(f.arrival)))
@@ -114,30 +124,30 @@ def _findings(done: Tracking) -> tuple[KeyNumber, ...]:
     return tuple(out)
 
 
-def _steps(done: Tracking) -> tuple[Step, ...]:
-    fit = typed(done.folder if done.fit is None else done.folder / FIT)
+def _steps(result: Tracking) -> tuple[Step, ...]:
+    fit = typed(result.folder if result.fit is None else result.folder / FIT)
     own = Step("Ask for poles of your own.", f'upright track {fit} --poles "-10+-20j, -25+-10j"')
-    if done.fit is None:
+    if result.fit is None:
         return (own,)
-    model = done.rig.plant.coordinates
-    counts = "" if model[0].unit == "rad" else f" --counts {done.rig.per_unit[0]:.6g}"
+    model = result.rig.plant.coordinates
+    counts = "" if model[0].unit == "rad" else f" --counts {result.rig.per_unit[0]:.6g}"
     return (
         Step(
             "Repeat the fit from its files.",
-            f"upright identify {typed(done.folder / STUDY)} -o {typed(done.folder / 'again')}",
+            f"upright identify {typed(result.folder / STUDY)} -o {typed(result.folder / 'again')}",
         ),
         own,
         Step(
             "See margins and noise of one set.",
             f"upright design {fit} --at {AT} --track {model[-1].name} --period "
-            f'"{1e3 * done.rig.period:g} ms"{counts} --poles "{TABLE_2[-1]}"',
+            f'"{1e3 * result.rig.period:g} ms"{counts} --poles "{TABLE_2[-1]}"',
         ),
     )
 
 
-def _data(done: Tracking) -> list[Part]:
+def _data(result: Tracking) -> list[Part]:
     """The log, and the model found in it; nothing where only a fit was given."""
-    fit = done.fit
+    fit = result.fit
     if fit is None:
         return []
     scores = ", ".join(f"{plain(n)} {v:.2f} %" for s in fit.runs.values() if s.role != "fit"
@@ -147,19 +157,19 @@ def _data(done: Tracking) -> list[Part]:
         "end about where they began; pauses let dry friction show. Encoders count, the log is every fifth "
         "servo sample. Other pulses, never fitted, test the model."
     )
-    found = f"{fit.verdict} Other pulses are predicted: {scores}."
+    sentence = f"{fit.verdict} Other pulses are predicted: {scores}."
     scale = _scale(fit.model.parameters["actuator.gain"].estimate)
     return [
         Part("Data", (pulses, *run_pictures(fit, "track"))),
         motion_part(fit),
-        Part("Fit", (found, scale, _fit_table(done, fit))),
+        Part("Fit", (sentence, scale, _fit_table(result, fit))),
     ]
 
 
-def _fit_table(done: Tracking, fit: Fit) -> Table:
+def _fit_table(result: Tracking, fit: Fit) -> Table:
     """Numbers of the shaft, with the truth that only a twin can tell."""
     return parameter_table(
-        fit, truth=done.true.plant.parameters() | {"actuator.gain": done.true.gain},
+        fit, truth=result.true.plant.parameters() | {"actuator.gain": result.true.gain},
         caption="What the pulses say, beside the truth of the twin; the interval holds the truth in 95 of 100 rigs",
     )  # fmt: skip
 
@@ -174,74 +184,74 @@ def _scale(weighed: bool) -> str:
     )
 
 
-def _gains(done: Tracking, far: str) -> Part:
+def _gains(result: Tracking, far: str) -> Part:
     """Gains, poles, and the size of the step."""
     return Part(
         "Gains",
         (
             "Ackermann's formula on the fitted model puts the poles where Table 2 of the paper has them; "
             f"k_pf = 1/(C (B K − A)⁻¹ B) gives unit static gain from the reference to {far}.",
-            f"The step is {length(done, done.step.size)}, {_sized(done)}. The largest command is the first: speeds are "
-            "zero and errors the whole step, so that it is k_pf times the step, whatever the rig.",
-            tables.gain_table(done),
-            tables.shaft_pole_table(done),
+            f"The step is {length(result, result.step.size)}, {_sized(result)}. The largest command is the first: "
+            "speeds are zero and errors the whole step, so that it is k_pf times the step, whatever the rig.",
+            tables.gain_table(result),
+            tables.shaft_pole_table(result),
             Picture(
-                name="track-poles", draw=lambda: poles_figure(done),
-                caption="Poles asked (rings), of the sampled, late loop on the fitted model (+) and on the rig (x). "
-                "Delay and differences move the fast poles; the flexible mode stays where it was asked.",
+                name="track-poles", draw=lambda: poles_figure(result),
+                caption="Poles requested (rings), of the sampled, late loop on the fitted model (+) and the rig (x). "
+                "Delay and differences move the fast poles; the flexible mode stays where it was requested.",
                 description="Upper half of the s-plane for every set.",
             ),
         ),
     )  # fmt: skip
 
 
-def _sized(done: Tracking) -> str:
-    step = done.step
+def _sized(result: Tracking) -> str:
+    step = result.step
     others = {
         "effort": (f"{100 * RESERVE:.0f} % of the drive's limit", step.by_effort),
         "twist": ("60 % of the twist that trips the shaft", step.by_twist),
         "travel": ("60 % of the travel", step.by_travel),
     }
-    allowed = ", ".join(f"{what} {length(done, v)}" for what, v in others.values() if math.isfinite(v))
+    allowed = ", ".join(f"{what} {length(result, v)}" for what, v in others.values() if math.isfinite(v))
     return f"{step.reason}; what each bound allows: {allowed}"
 
 
-def _loop(done: Tracking, near: str, far: str) -> Part:
+def _loop(result: Tracking, near: str, far: str) -> Part:
     """Step figures and pictures of the sets."""
-    shares = ", ".join(f"{o.law.name} {percentage(o.measured.effort.share, 0)}" for o in done.sets)
-    best = _strongest(done)
+    shares = ", ".join(f"{o.law.name} {percentage(o.measured.effort.share, 0)}" for o in result.sets)
+    best = _strongest(result)
     off = abs(best.measured.effort.peak / best.predicted.effort.peak - 1)
-    told = f"Largest command, of the drive's limit: {shares}."
-    if done.found:
-        told += (
-            f" Foreseen for {best.law.name}: "
-            f"{best.predicted.effort.peak:.3g} {done.rig.unit} ({percentage(best.predicted.effort.share)}); found "
-            + ("the same." if off < 5e-4 else f"{best.measured.effort.peak:.3g} {done.rig.unit}.")
+    sentence = f"Largest command, of the drive's limit: {shares}."
+    if result.tried:
+        sentence += (
+            f" Predicted for {best.law.name}: "
+            f"{best.predicted.effort.peak:.3g} {result.rig.unit} ({percentage(best.predicted.effort.share)}); found "
+            + ("the same." if off < 5e-4 else f"{best.measured.effort.peak:.3g} {result.rig.unit}.")
         )
     steps = Picture(
-        name="track-steps", draw=lambda: steps_figure(done, done.sets),
+        name="track-steps", draw=lambda: steps_figure(result, result.sets),
         caption=f"Reference (dotted), {near} of the driven body, {far} of the far one, and the first 0.1 s of "
         "the command with the drive's limit, set by set.",
-        description=_described(done),
+        description=_described(result),
     )  # fmt: skip
-    return Part("Closed loop", (told, tables.step_table(done), steps))
+    return Part("Closed loop", (sentence, tables.step_table(result), steps))
 
 
-def _described(done: Tracking) -> str:
+def _described(result: Tracking) -> str:
     """The picture of the steps, for who cannot see it."""
     return "; ".join(
         f"{o.law.name}: overshoot {percentage(o.measured.figures.overshoot)}, settled to 5 % after "
         f"{milli(o.measured.figures.settling_5)} s"
-        for o in done.sets
+        for o in result.sets
         if o.measured.figures is not None
     )
 
 
-def _friction(done: Tracking, far: str) -> Part:
+def _friction(result: Tracking, far: str) -> Part:
     """What dry friction leaves, why, and the cure."""
     cure = ""
-    if done.summed is not None and done.summed.measured.figures is not None:
-        left = abs(done.summed.measured.figures.error) / done.step.size
+    if result.summed is not None and result.summed.measured.figures is not None:
+        left = abs(result.summed.measured.figures.error) / result.step.size
         cure = (
             f" The sum of the error, with a fifth pole at −5 1/s, is the cure: it leaves {percentage(left)} of the "
             "step, and the push is made up for. Its zero cancels that pole on the reference's way, so that the step "
@@ -253,27 +263,27 @@ def _friction(done: Tracking, far: str) -> Part:
             f"At rest the spring may hold the far body off by f_2/k, and the drive need not move the near one before "
             f"its pull exceeds f_1: {far} stays wrong by up to (f_1 + f_2)/(gain k_pf) + (K_1/k_pf) f_2/k. The first "
             f"part shrinks as the loop gets stiffer, the second does not.{cure}",
-            tables.friction_table(done),
+            tables.friction_table(result),
         ),
     )
 
 
-def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: str, far: str) -> Part:
+def _why(result: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: str, far: str) -> Part:
     """PD control beside state feedback, and what its one damper cannot do."""
-    best = _strongest(done)
-    p = done.model.plant.parameters()
+    best = _strongest(result)
+    p = result.model.plant.parameters()
     inertia = p.get("m_1", p.get("J_1", 1.0))
     other = p.get("m_2", p.get("J_2", 1.0))
-    force = "N m/rad" if done.rig.plant.coordinates[-1].unit == "rad" else "N/m"
+    force = "N m/rad" if result.rig.plant.coordinates[-1].unit == "rad" else "N/m"
     bound = 0.5 * math.sqrt(p["k_12"] / inertia)
-    compared = [best, *((done.summed,) if done.summed else ()), pd, stiff, other_end]
+    compared = [best, *((result.summed,) if result.summed else ()), pd, stiff, other_end]
     trips = other_end.measured.tripped
     end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
-    if done.found and not other_end.tried:
-        end = f"was not tried; it is foreseen that it {end}"
-    guessed = [o.law.name for o in compared if done.found and not o.tried]
-    foreseen = f" Foreseen, not tried: {', '.join(guessed)}." if guessed else ""
-    tried = 0 if done.search is None else done.search.kp.size
+    if result.tried and not other_end.tried:
+        end = f"was not tried; it is predicted that it {end}"
+    guessed = [o.law.name for o in compared if result.tried and not o.tried]
+    foreseen = f" Predicted, not tried: {', '.join(guessed)}." if guessed else ""
+    tried = 0 if result.search is None else result.search.kp.size
     return Part(
         "Why state feedback",
         (
@@ -292,26 +302,26 @@ def _why(done: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near: 
             "damping for any kp and kd: the polynomial lacks s³).",
             Picture(
                 name="track-compared",
-                draw=lambda: steps_figure(done, compared, until=DWELL + 1.4, kick=None),
+                draw=lambda: steps_figure(result, compared, until=DWELL + 1.4, kick=None),
                 caption="The same step, then a steady push of the drive, which the command shown contains. A cross: "
                 "the rig has tripped." + foreseen,
-                description=f"State feedback beside PD control: {_described(done)}",
+                description=f"State feedback beside PD control: {_described(result)}",
             ),
-            *_reasons(done, pd, stiff, bound),
+            *_reasons(result, pd, stiff, bound),
         ),
     )  # fmt: skip
 
 
-def _reasons(done: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> list[Picture]:
+def _reasons(result: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> list[Picture]:
     """Stiffness against decay, and the root loci of both PDs."""
-    model, pd = done.model.linear(AT), tuned.law
-    p = done.model.plant.parameters()
-    of = done.rig.plant.coordinates[-1].unit
-    kp = np.geomspace(0.2 * pd.k_pf, 2.5 * _strongest(done).law.k_pf, 40)
-    points = {o.law.name: (o.law.stiffness, o.law.decay) for o in (*done.sets, tuned, stiff)}
+    model, pd = result.model.linear(AT), tuned.law
+    p = result.model.plant.parameters()
+    of = result.rig.plant.coordinates[-1].unit
+    kp = np.geomspace(0.2 * pd.k_pf, 2.5 * _strongest(result).law.k_pf, 40)
+    points = {o.law.name: (o.law.stiffness, o.law.decay) for o in (*result.sets, tuned, stiff)}
     bargain = Tradeoff(
-        stiffness=kp * done.model.gain, bound=bound, shaft=p["k_12"], points=points,
-        decay=best_decay(sampled(done.model), kp, period=done.model.period),
+        stiffness=kp * result.model.gain, bound=bound, shaft=p["k_12"], points=points,
+        decay=best_decay(sampled(result.model), kp, period=result.model.period),
         unit=f"{'N m' if of == 'rad' else 'N'}/{of}",
     )  # fmt: skip
     rate = float(pd.K[1]) / pd.k_pf
@@ -339,32 +349,33 @@ def _reasons(done: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> li
     ]  # fmt: skip
 
 
-def _numbers(done: Tracking) -> dict[str, Any]:
+def _numbers(result: Tracking) -> dict[str, Any]:
     """The same as plain values: SI, the command in its unit, null for what never happens."""
 
     def run(r: StepTrial) -> dict[str, Any]:
         f = r.figures
-        told = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
+        names = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
         return {
-            **{n: None if f is None else getattr(f, n) for n in told},
+            **{n: None if f is None else getattr(f, n) for n in names},
+            "rest": None if r.rest is None else {"quiet": r.rest.quiet, "rms": r.rest.rms, "peak": r.rest.peak},
             "effort_peak": r.effort.peak, "effort_share": r.effort.share, "saturated": r.effort.saturated,
             "twist": r.twist, "travel": r.travel, "give": r.give, "tripped": r.tripped,
         }  # fmt: skip
 
     return {
-        "rig": done.rig.name,
-        "seed": done.rig.seed,
-        "step": done.step.size,
-        "step_reason": done.step.reason,
-        "limit": done.rig.limit,
+        "rig": result.rig.name,
+        "seed": result.rig.seed,
+        "step": result.step.size,
+        "step_reason": result.step.reason,
+        "limit": result.rig.limit,
         "laws": {
             o.law.name: {
-                "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": o.law.asked,
+                "K": o.law.K, "k_pf": o.law.k_pf, "poles_asked": o.law.requested,
                 "poles": o.law.poles, "decay": o.law.decay, "damping": o.law.damping,
                 "static_force_per_error": o.law.stiffness, "error_at_most": o.law.play, "foreseen": run(o.predicted),
                 "found": run(o.measured) if o.tried else None, "within_limits": o.within,
-            } for o in tables.tried_laws(done)
+            } for o in tables.tried_laws(result)
         },
-        "seconds": done.seconds,
-        "interrupted": done.interrupted,
+        "seconds": result.seconds,
+        "interrupted": result.interrupted,
     }  # fmt: skip

@@ -43,15 +43,15 @@ def in_reading_unit(of: str) -> tuple[float, str]:
 
 @styled
 def steps_figure(
-    done: Tracking, outcomes: Sequence[Outcome], *, until: float = 0.5, kick: float | None = 0.1
+    result: Tracking, outcomes: Sequence[Outcome], *, until: float = 0.5, kick: float | None = 0.1
 ) -> Figure:
     """Reference, positions and effort with its limit, all laws in one picture; a run ends where it tripped.
 
     With `kick` both positions are shown, and the command only so long [s], for that is where it acts.
     """
-    bodies = done.rig.plant.coordinates
+    bodies = result.rig.plant.coordinates
     factor, of = in_reading_unit(bodies[-1].unit)
-    step = factor * done.step.size
+    step = factor * result.step.size
     picked = [bodies[-1]] if kick is None else [bodies[0], bodies[-1]]
     rows = len(picked) + 1
     drawing = figure(0.85 + 1.75 * rows + 0.3 * (rows - 2), margins=(0.75, 0.15, 0.38, 0.48))
@@ -60,7 +60,7 @@ def steps_figure(
     for ax, body in zip(axes, picked, strict=False):
         ax.plot([-0.05, 0, 0, until], [0, 0, step, step], color=BLACK, linewidth=0.8, linestyle=":", label="reference")
         for (colour, style), o in zip(CYCLE, outcomes, strict=False):
-            t, y = _seen(o, body.name, -0.05, until)
+            t, y = _part(o, body.name, -0.05, until)
             line = decimated(t, factor * y)
             ax.plot(*line, color=colour, linestyle=style, label=o.law.name)
             if o.measured.tripped - BEFORE < until:
@@ -69,7 +69,7 @@ def steps_figure(
         ax.set_ylabel(axis(mathtext(body.name), of))
         ax.set_ylim(low, high)
         ax.set_xlim(-0.06, 1.02 * until)
-    _efforts(axes[-1], done, outcomes, until if kick is None else kick)
+    _efforts(axes[-1], result, outcomes, until if kick is None else kick)
     if until > DWELL:
         for ax in axes:
             ax.axvline(DWELL, color=GREY, linewidth=0.8, linestyle="-.")
@@ -84,28 +84,28 @@ def steps_figure(
     return drawing
 
 
-def _seen(o: Outcome, name: str, start: float, stop: float) -> tuple[Array, Array]:
+def _part(o: Outcome, name: str, start: float, stop: float) -> tuple[Array, Array]:
     """Time from the step [s] and what was logged between two instants, up to a trip."""
     record = o.measured.trial.record
     t = record.t - BEFORE
-    kept = (record.t <= o.measured.tripped) & (t >= start) & (t <= stop)
-    return t[kept], record[name][kept]
+    inside = (record.t <= o.measured.tripped) & (t >= start) & (t <= stop)
+    return t[inside], record[name][inside]
 
 
-def _efforts(ax: Any, done: Tracking, outcomes: Sequence[Outcome], until: float) -> None:
+def _efforts(ax: Any, result: Tracking, outcomes: Sequence[Outcome], until: float) -> None:
     for (colour, style), o in zip(CYCLE, outcomes, strict=False):
-        drawn = decimated(*_seen(o, "u", -0.05 * until, until))
+        drawn = decimated(*_part(o, "u", -0.05 * until, until))
         ax.step(*drawn, color=colour, linestyle=style, linewidth=1.0, where="post")
-    draw_limits(ax, done.rig.limit, "limit", until)
-    ax.set_ylim(-1.3 * done.rig.limit, 1.3 * done.rig.limit)
+    draw_limits(ax, result.rig.limit, "limit", until)
+    ax.set_ylim(-1.3 * result.rig.limit, 1.3 * result.rig.limit)
     ax.set_xlim(-0.06 if until > 1 else -0.05 * until, 1.02 * until)
-    ax.set_ylabel(axis("command", done.rig.unit))
+    ax.set_ylabel(axis("command", result.rig.unit))
 
 
 @styled
-def poles_figure(done: Tracking) -> Figure:
-    """Poles asked and attained, set by set; the upper half plane, which the lower mirrors."""
-    laws, open_loop = [o.law for o in done.sets], done.model.linear(AT).poles()
+def poles_figure(result: Tracking) -> Figure:
+    """Requested and attained poles, set by set; the upper half plane, which the lower mirrors."""
+    laws, open_loop = [o.law for o in result.sets], result.model.linear(AT).poles()
     columns = min(2, len(laws))
     rows = -(-len(laws) // columns)
     drawing = figure(0.85 + 2.0 * rows, margins=(0.65, 0.15, 0.55, 0.48))
@@ -113,13 +113,13 @@ def poles_figure(done: Tracking) -> Figure:
         rows, columns, squeeze=False, sharey=True, gridspec_kw={"hspace": 0.32, "wspace": 0.08}
     )
     axes: list[Any] = grid.ravel().tolist()
-    left = 1.12 * min(float(law.asked.real.min()) for law in laws)
-    high = 1.2 * max(float(np.abs(p.imag).max()) for p in (open_loop, *(law.asked for law in laws)))
+    left = 1.12 * min(float(law.requested.real.min()) for law in laws)
+    high = 1.2 * max(float(np.abs(p.imag).max()) for p in (open_loop, *(law.requested for law in laws)))
     for ax, law in zip(axes, laws, strict=False):
         s_plane(ax)
-        on_rig = loop_poles(done.rig, law.law)
+        on_rig = loop_poles(result.rig, law.law)
         kinds = (
-            ("open loop", open_loop, "x", GREY, 6), ("asked", law.asked, "o", BLACK, 9),
+            ("open loop", open_loop, "x", GREY, 6), ("requested", law.requested, "o", BLACK, 9),
             ("on the fitted model, sampled and late", law.poles, "+", BLUE, 9),
             ("on the rig", on_rig, "x", VERMILLION, 6),
         )  # fmt: skip

@@ -52,8 +52,8 @@ class Tracker:
     law : Law
     poles : array
         Poles [1/s] of the sampled loop on the rig of the design, those that die within three samples left out.
-    asked : array
-        Poles asked for; empty for a PD.
+    requested : array
+        Requested poles; empty for a PD.
     stiffness : float
         Static force per error, k_pf times the drive's gain [N/m or N m/rad]: how hard it pulls at rest.
     play : float
@@ -65,7 +65,7 @@ class Tracker:
     k_pf: float
     law: Law
     poles: Roots
-    asked: Roots
+    requested: Roots
     stiffness: float
     play: float
 
@@ -80,12 +80,12 @@ class Tracker:
         return float(np.min(-self.poles.real / np.abs(self.poles)))
 
 
-def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, asked: Roots | None = None) -> Tracker:
+def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, requested: Roots | None = None) -> Tracker:
     """Gains as a law on a rig's encoders, and what it is worth there."""
     law = state_law(rig, K, k_pf)
     return Tracker(
         name=name, K=np.ravel(K), k_pf=k_pf, law=law, poles=loop_poles(rig, law),
-        asked=np.zeros(0, dtype=np.complex128) if asked is None else asked, stiffness=rig.gain * k_pf,
+        requested=np.zeros(0, dtype=np.complex128) if requested is None else requested, stiffness=rig.gain * k_pf,
         play=play(rig, np.ravel(K), k_pf),
     )  # fmt: skip
 
@@ -100,7 +100,7 @@ def by_poles(rig: Rig, name: str, wanted: Roots) -> Tracker:
     """State feedback by Ackermann's formula, with the prefilter for unit static gain to the far body."""
     model = rig.linear(AT)
     K = place(model.A, model.B, wanted).K
-    return tracker(rig, name, K, prefilter(model.A, model.B, far(model), K), asked=wanted)
+    return tracker(rig, name, K, prefilter(model.A, model.B, far(model), K), requested=wanted)
 
 
 def check_sets(which: Sequence[int], own: Roots | None) -> None:
@@ -146,9 +146,9 @@ def with_sum(rig: Rig, base: Tracker, name: str) -> Tracker:
     n, c = model.A.shape[0], len(rig.plant.coordinates)
     A = np.zeros((n + 1, n + 1))
     A[:n, :n], A[n, :n] = model.A, -far(model)
-    K = place(A, np.vstack([model.B, np.zeros((1, 1))]), np.append(base.asked, EXTRA)).K[0]
+    K = place(A, np.vstack([model.B, np.zeros((1, 1))]), np.append(base.requested, EXTRA)).K[0]
     k_pf = K[n] / EXTRA  # the sum's gain is -K[n]
-    plain = tracker(rig, name, K[:n], k_pf, asked=np.append(base.asked, EXTRA))
+    plain = tracker(rig, name, K[:n], k_pf, requested=np.append(base.requested, EXTRA))
     law = state_law(rig, K[:n], k_pf)
     z = law.A.shape[0]
     inner = np.zeros((z + 1, z + 1))
@@ -216,8 +216,8 @@ def tune(rig: Rig, step: float, most: float) -> tuple[Tracker, GainSearch]:
         best = rows[order[0]]
         kp = np.minimum(best[0] * np.geomspace(0.8, 1.25, 9), most / step)
         rate = best[1] / best[0] * np.geomspace(0.8, 1.25, 9)
-    found = GainSearch(kp=rows[:, 0], kd=rows[:, 1], arrival=rows[:, 2], settling=rows[:, 3])
-    return near_pd(rig, "PD, tuned", float(best[0]), float(best[1])), found
+    searched = GainSearch(kp=rows[:, 0], kd=rows[:, 1], arrival=rows[:, 2], settling=rows[:, 3])
+    return near_pd(rig, "PD, tuned", float(best[0]), float(best[1])), searched
 
 
 def tried(rig: Rig, pairs: Array, step: float) -> Array:
@@ -229,17 +229,17 @@ def tried(rig: Rig, pairs: Array, step: float) -> Array:
     many = Law(A, B, C, D, references=np.array([step]))
     count = round(DWELL / rig.period)
     start = rig.plant.state(AT)
-    given = law_on_rig(rig, many, np.zeros(c))
+    loop = law_on_rig(rig, many, np.zeros(c))
     x = simulate(
-        rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=SUBSTEPS, loop=given
+        rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=SUBSTEPS, loop=loop
     )[:, 2 * c - 2]  # fmt: skip
     t, out = np.arange(count, dtype=np.float64) * rig.period, np.full((len(laws), 2), np.inf)
     for i, y in enumerate(x.T):
         try:
-            found = step_figures(t, y, before=0.0, reference=step, resolution=float(rig.resolution[-1]))
+            figures = step_figures(t, y, before=0.0, reference=step, resolution=float(rig.resolution[-1]))
         except BadInput:  # friction held it where it was
             continue
-        out[i] = found.arrival, found.settling_5
+        out[i] = figures.arrival, figures.settling_5
     return out
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from upright.basis import SIMULATED
 from upright.control import Trial, trial
-from upright.control.effort import Effort, effort
+from upright.control.effort import Effort, RestEffort, effort, rest_effort, resting
 from upright.control.score import StepFigures, step_figures
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
@@ -64,6 +64,8 @@ class StepTrial:
         Of the far body; None where the rig trips or nothing moves.
     effort : Effort
         Of the step, up to the push.
+    rest : RestEffort or None
+        Of the last third of that, about what keeps the place; None where the run ended before.
     twist, travel : float
         Largest distance between the bodies, and from where they began, up to the push [m or rad].
     give : float
@@ -75,6 +77,7 @@ class StepTrial:
     trial: Trial
     figures: StepFigures | None
     effort: Effort
+    rest: RestEffort | None
     twist: float
     travel: float
     give: float
@@ -91,8 +94,13 @@ class Outcome:
 
     @property
     def tried(self) -> bool:
-        """Whether the rig was stepped with it; else what is measured is what is foreseen."""
+        """Whether the rig was stepped with it; else the measured figures are the predicted ones."""
         return self.measured is not self.predicted
+
+    @property
+    def quiet(self) -> bool:
+        """Whether the command is quiet once the step is done; a run that ended before says nothing of that."""
+        return self.measured.rest is None or self.measured.rest.quiet
 
     @property
     def within(self) -> bool:
@@ -163,8 +171,8 @@ class Tracking:
         return self.fit is not None
 
     @property
-    def found(self) -> bool:
-        """Whether anything was tried, beside what the model foresees."""
+    def tried(self) -> bool:
+        """Whether anything was tried, beside what the model predicts."""
         return any(o.tried for o in self.outcomes)
 
     @property
@@ -190,7 +198,7 @@ def run_tracking(
     folder : Path
         Takes logs, study and fit.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
         Asked between trials whether to stop there.
     which : sequence of int
@@ -207,7 +215,7 @@ def run_tracking(
     true = make_rig(MAKES[rig].shaft if rig in MAKES else rig, seed) if isinstance(rig, str) else rig
     progress("pulsing the shaft", 0.0)
     study, fit = identify_shaft(true, seed, folder, lambda what, share: progress(what, 0.05 + 0.25 * share), weighed)
-    done = track_on(
+    result = track_on(
         fitted(true, fit),
         TwinStand(rig=another_day(true, seed), make=make_of(true.plant)),
         folder,
@@ -220,7 +228,7 @@ def run_tracking(
         step=step,
     )
     return replace(
-        done, true=true, seconds=time.perf_counter() - began, interrupted=done.interrupted or fit.interrupted
+        result, true=true, seconds=time.perf_counter() - began, interrupted=result.interrupted or fit.interrupted
     )
 
 
@@ -236,7 +244,7 @@ def track_on(
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None,
 ) -> Tracking:  # fmt: skip
-    """Design on the model and try on the rig; without a rig only what the model foresees is told. See `run_tracking`.
+    """Design on the model and try on the rig; without a rig only the prediction is reported. See `run_tracking`.
 
     Pole sets of Table 2 are for the makers' rigs; those of one's own are as much faster as the shaft swings faster.
 
@@ -258,24 +266,24 @@ def track_on(
     rig = model if stand is None else stand.rig
     chosen = choose_step(model, laws, step)
     progress("stepping", 0.35)
-    done = Tracking(
+    result = Tracking(
         rig=rig, model=model, true=rig, folder=folder, study=study, fit=fit, step=chosen,
         sets=tuple(outcome(law) for law in laws),
         performed=SIMULATED if stand is None else stand.performed,
     )  # fmt: skip
     if stopped():
-        return replace(done, interrupted=True)
+        return replace(result, interrupted=True)
     strongest = laws[int(np.argmax([law.k_pf for law in laws]))]
-    done = replace(done, summed=outcome(with_sum(model, strongest, "with a sum")))
+    result = replace(result, summed=outcome(with_sum(model, strongest, "with a sum")))
     progress("tuning a PD", 0.55)
     pd, search = tune(model, chosen.size, RESERVE * model.limit)
-    done = replace(done, pd=outcome(pd), search=search)
+    result = replace(result, pd=outcome(pd), search=search)
     if stopped():
-        return replace(done, interrupted=True)
+        return replace(result, interrupted=True)
     progress("comparing", 0.9)
     stiff = stiffest_damped(model, strongest.k_pf)
     far = far_pd(model, "PD, far encoder", pd.k_pf, float(pd.K[1]))
-    return replace(done, stiff=outcome(stiff), far=outcome(far))
+    return replace(result, stiff=outcome(stiff), far=outcome(far))
 
 
 def stiffest_damped(model: Rig, kp: float) -> Tracker:
@@ -297,17 +305,17 @@ def choose_step(model: Rig, laws: Sequence[Tracker], step: float | None = None) 
     digits = 10.0 ** (math.floor(math.log10(size)) - 1)
     size = float(f"{math.floor(size / digits + 1e-9) * digits:.2g}")
     if step is not None:
-        size, reason = step, "as asked"
+        size, reason = step, "as requested"
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
 
 
 def _times_as_fast(model: Rig) -> float:
-    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).plant)]
+    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).rig.plant)]
     return swings[0] / swings[1]
 
 
 def _tried(stand: TestStand, law: Tracker, expected: StepTrial, step: float, folder: Path) -> StepTrial | None:
-    """The law on the rig; None where it is foreseen to leave a live rig's bounds."""
+    """The law on the rig; None where it is predicted to leave a live rig's bounds."""
     safe = math.isinf(expected.tripped) and law.decay > 0 and not expected.effort.saturated
     if not stand.simulated and not safe:
         return None
@@ -315,14 +323,14 @@ def _tried(stand: TestStand, law: Tracker, expected: StepTrial, step: float, fol
         f"Next is {law.name}. Let everything rest with {stand.names[0]} in the middle of its "
         "travel; a small pulse comes first, then the step, then a steady push of the drive."
     )
-    reference, pushes = asked_of(stand.rig, step)
+    reference, pushes = levels_of(stand.rig, step)
     stem = f"tracking_{law.name.replace(' ', '_').replace(',', '')}"
     seconds = (reference.size - 1) * stand.rig.period
     run = stand.hold(law.law, AT, folder, stem, seconds, reference=reference, pushes=pushes)
     return figured(run.trial, step)
 
 
-def asked_of(rig: Rig, step: float) -> tuple[Array, Array]:
+def levels_of(rig: Rig, step: float) -> tuple[Array, Array]:
     """Reference and push, sample by sample: zero, the step, then a steady push while the reference stays."""
     before, at, end = _ticks(rig)
     reference, pushes = np.zeros(end + 1), np.zeros(end + 1)
@@ -337,7 +345,7 @@ def _ticks(rig: Rig) -> tuple[int, int, int]:
 
 def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
     """A law on a simulated rig."""
-    reference, pushes = asked_of(rig, step)
+    reference, pushes = levels_of(rig, step)
     start = np.zeros(2 * len(rig.plant.coordinates))
     return figured(
         trial(rig, law.law, at=AT, start=start, seconds=(reference.size - 1) * rig.period, reference=reference,
@@ -345,28 +353,34 @@ def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
     )  # fmt: skip
 
 
-def figured(done: Trial, step: float) -> StepTrial:
+def _rest(t: Array, u: Array, limit: float) -> RestEffort:
+    """Command at rest about its mean, which a spring to ground may take to hold a place."""
+    return rest_effort(t, u - float(np.mean(resting(u))), limit)
+
+
+def figured(trial: Trial, step: float) -> StepTrial:
     """Figures of a trial, which may have ended before its time."""
-    rig = done.rig
+    rig = trial.rig
     before, at, end = _ticks(rig)
-    q = done.x[:, ::2]
+    q = trial.x[:, ::2]
     apart, away = np.abs(q[:, -1] - q[:, 0]), np.abs(q).max(axis=1)
     beyond = np.flatnonzero((apart > rig.twist) | (away > rig.travel))
-    first = int(beyond[0]) if beyond.size else done.t.size - 1
-    ended = bool(beyond.size) or done.t.size <= end
-    tripped = float(done.t[first]) if ended else math.inf
+    first = int(beyond[0]) if beyond.size else trial.t.size - 1
+    ended = bool(beyond.size) or trial.t.size <= end
+    tripped = float(trial.t[first]) if ended else math.inf
     last = min(at, first)
-    y = done.record[done.record.outputs[-1]]
+    y = trial.record[trial.record.outputs[-1]]
     figures = None
     if not ended:
         try:
             figures = step_figures(
-                done.t[before:at], y[before:at], before=0.0, reference=step, resolution=float(rig.resolution[-1])
+                trial.t[before:at], y[before:at], before=0.0, reference=step, resolution=float(rig.resolution[-1])
             )
         except BadInput:  # friction held it where it was
             figures = None
     return StepTrial(
-        trial=done, figures=figures, effort=effort(done.u[before : last + 1], rig.limit, rig.converter),
+        trial=trial, figures=figures, effort=effort(trial.u[before : last + 1], rig.limit, rig.converter),
+        rest=None if ended else _rest(trial.t[before:at], trial.u[before:at], rig.limit),
         twist=float(apart[: last + 1].max()), travel=float(away[: last + 1].max()),
         give=math.inf if ended else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
     )  # fmt: skip

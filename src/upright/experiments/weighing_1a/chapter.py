@@ -17,7 +17,7 @@ from upright.records import Record
 from upright.report.fit.tables import finding, interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import number, typed, unit, with_error
-from upright.rig.makes import OSCILLATORS, Make
+from upright.rig.makes import BODIES, Make
 
 QUESTION = (
     "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "
@@ -27,39 +27,39 @@ QUESTION = (
 MOST_PANELS = 6
 
 
-def chapter(done: Weighing) -> Chapter:
+def chapter(result: Weighing) -> Chapter:
     """Experiment 1a on a rig, beside the truth of a twin."""
-    campaign = done.campaign
-    found, body = campaign.loadings, OSCILLATORS[campaign.kind]
-    told = loading_chapter(
-        found, kind=campaign.kind, title="Stiffness and inertia from added loads", logs=campaign.logs,
+    campaign = result.campaign
+    loadings, body = campaign.loadings, BODIES[campaign.kind]
+    page = loading_chapter(
+        loadings, kind=campaign.kind, title="Stiffness and inertia from added loads", logs=campaign.logs,
         signals={label: record.outputs[0] for label, record in campaign.logs.items()}, left_out=campaign.left_out,
-        truth=campaign.truth or None, steps=_steps(done),
+        truth=campaign.truth or None, steps=_steps(result),
     )  # fmt: skip
-    if done.make is not None:
-        return _later_chapter(done, done.make, told)
-    named = (("k", found.k, "stiffness"), (body.bare, found.bare, "inertia"), ("c", found.damping, "damping"))
+    if result.make is not None:
+        return _later_chapter(result, result.make, page)
+    named = (("k", loadings.k, "stiffness"), (body.bare, loadings.bare, "inertia"), ("c", loadings.damping, "damping"))
     findings = tuple(
         finding(Symbol(f"{n} [{unit(_unit(campaign.kind, what))}]"), e, campaign.truth.get(n)) for n, e, what in named
     )
-    weighed = {body.inertia: {**plain_estimate(found.bare), "unit": body.unit}}
-    handed_on = {k.name: {"value": k.value, "stderr": k.stderr} for k in done.known}
-    numbers = {**told.numbers, "parameters": weighed, "handed_on": handed_on}
-    return replace(told, key="1a", findings=findings, numbers=numbers)
+    weighed = {body.inertia: {**plain_estimate(loadings.bare), "unit": body.unit}}
+    handed_on = {k.name: {"value": k.value, "stderr": k.stderr} for k in result.known}
+    numbers = {**page.numbers, "parameters": weighed, "handed_on": handed_on}
+    return replace(page, key="1a", findings=findings, numbers=numbers)
 
 
-def _later_chapter(done: Weighing, make: Make, weighed: Chapter) -> Chapter:
+def _later_chapter(result: Weighing, make: Make, weighed: Chapter) -> Chapter:
     """The chapter of a twin's body, with the rig that is built on it for the later experiments."""
-    campaign = done.campaign
-    found, true = campaign.loadings, campaign.truth
-    digits = {k.name: figures(k.value, k.stderr) for k in done.known}
-    units = {k.name: unit(type(done.rig.plant).quantity(k.name).unit) for k in done.known}
+    campaign = result.campaign
+    loadings, true = campaign.loadings, campaign.truth
+    digits = {k.name: figures(k.value, k.stderr) for k in result.known}
+    units = {k.name: unit(type(result.rig.plant).quantity(k.name).unit) for k in result.known}
     handed = Table(
         caption="What the later experiments take from here",
         headings=("symbol", "truth of the twin", "value", "std. error", "unit"),
         rows=tuple(
-            (Symbol(k.name), number(_truth(done, k), digits[k.name]), *with_error(k.value, k.stderr), units[k.name])
-            for k in done.known
+            (Symbol(k.name), number(_truth(result, k), digits[k.name]), *with_error(k.value, k.stderr), units[k.name])
+            for k in result.known
         ),
         numbers=(1, 2, 3),
     )  # fmt: skip
@@ -67,12 +67,12 @@ def _later_chapter(done: Weighing, make: Make, weighed: Chapter) -> Chapter:
         f"{len(campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
         "friction, encoder counts and converter steps are as on the rig."
     )
-    named = (("k", found.k), (OSCILLATORS[campaign.kind].bare, found.bare), ("c", found.damping))
-    handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(done, k)} for k in done.known}
+    named = (("k", loadings.k), (BODIES[campaign.kind].bare, loadings.bare), ("c", loadings.damping))
+    handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(result, k)} for k in result.known}
     return replace(
         weighed,
         key="1a",
-        detail=" ".join(_sentence(done, k) for k in done.known),
+        detail=" ".join(_sentence(result, k) for k in result.known),
         parts=(
             Part("The body", (make.mounted.bare, steps)),
             *weighed.parts,
@@ -84,44 +84,44 @@ def _later_chapter(done: Weighing, make: Make, weighed: Chapter) -> Chapter:
                 value=number(k.value, digits[k.name]),
                 interval=f"{number(k.value - 1.96 * k.stderr, digits[k.name])} to "
                 f"{number(k.value + 1.96 * k.stderr, digits[k.name])}",
-                truth=number(_truth(done, k), digits[k.name]),
+                truth=number(_truth(result, k), digits[k.name]),
             )
-            for k in done.known
+            for k in result.known
         ),
         numbers={
             **{name: plain_estimate(w, true.get(name)) for name, w in named},
             "handed_on": handed_on,
-            "swings": len(found.swings),
+            "swings": len(loadings.swings),
         },
     )
 
 
-def _truth(done: Weighing, k: Known) -> float:
-    return done.rig.plant.parameters()[k.name]
+def _truth(result: Weighing, k: Known) -> float:
+    return result.rig.plant.parameters()[k.name]
 
 
-def _sentence(done: Weighing, k: Known) -> str:
-    off = abs(k.value / _truth(done, k) - 1)
-    inside = abs(k.value - _truth(done, k)) <= 1.96 * k.stderr
+def _sentence(result: Weighing, k: Known) -> str:
+    off = abs(k.value / _truth(result, k) - 1)
+    inside = abs(k.value - _truth(result, k)) <= 1.96 * k.stderr
     return f"{k.name} lies {100 * off:.2g} % from the twin's, {'inside' if inside else 'outside'} its 95 % interval."
 
 
-def _steps(done: Weighing) -> tuple[Step, ...]:
-    campaign, body = done.campaign, OSCILLATORS[done.campaign.kind]
-    if done.make is not None:
+def _steps(result: Weighing) -> tuple[Step, ...]:
+    campaign, body = result.campaign, BODIES[result.campaign.kind]
+    if result.make is not None:
         first = [label for label in campaign.files if label.endswith("run 1")]
-        files = " ".join(typed(done.folder / campaign.files[label]) for label in first)
+        files = " ".join(typed(result.folder / campaign.files[label]) for label in first)
         added = added_options(campaign, first)
         return (
             Step(
                 "Weigh the body again from one log of each loading, as you would your own.",
-                f"upright loadings {files} {added} -o {typed(done.folder / 'again')}",
+                f"upright loadings {files} {added} -o {typed(result.folder / 'again')}",
             ),
-            Step("See which masses would have told most.", f"upright plan-inertias --rig {campaign.kind}"),
+            Step("See which masses are most informative.", f"upright plan-inertias --rig {campaign.kind}"),
         )
-    files = " ".join(typed(done.folder / file) for file in campaign.files.values())
+    files = " ".join(typed(result.folder / file) for file in campaign.files.values())
     added = added_options(campaign, campaign.files)
-    added += f' --tolerance "{100 * done.tolerance:g} %"' if done.tolerance else ""
+    added += f' --tolerance "{100 * result.tolerance:g} %"' if result.tolerance else ""
     column = next(iter(campaign.logs.values())).outputs[0]
     return (
         Step("Weigh it again from one log of each loading, as you would from logs of your own.",
@@ -132,11 +132,11 @@ def _steps(done: Weighing) -> tuple[Step, ...]:
 
 def added_options(campaign: Campaign, labels: Iterable[str]) -> str:
     """Loadings of some logs as the command line takes them."""
-    return " ".join(f'--added "{campaign.added[n]:.6g} {OSCILLATORS[campaign.kind].unit}"' for n in labels)
+    return " ".join(f'--added "{campaign.added[n]:.6g} {BODIES[campaign.kind].unit}"' for n in labels)
 
 
 def loading_chapter(
-    found: Loadings, *, kind: str, title: str, logs: Mapping[str, Record], signals: Mapping[str, str],
+    loadings: Loadings, *, kind: str, title: str, logs: Mapping[str, Record], signals: Mapping[str, str],
     left_out: Sequence[str] = (), truth: Mapping[str, float] | None = None, steps: Sequence[Step] = (),
 ) -> Chapter:  # fmt: skip
     """What the loadings say; `truth` is what a twin knows, `logs` and `signals` go by the label of the log."""
@@ -146,47 +146,47 @@ def loading_chapter(
     )
     lost = (Part("Left out", (Points(tuple(left_out)),)),) if left_out else ()
     line = Picture(
-        name="line", draw=lambda: line_figure(found, _unit(kind, "inertia")),
+        name="line", draw=lambda: line_figure(loadings, _unit(kind, "inertia")),
         caption="1/ω² over the added inertia. The slope is 1/k, the line meets zero at minus the bare inertia. "
         "Bars: 95 % intervals of single swings.",
-        description=f"{len(found.swings)} points about a line; {found.verdict}",
+        description=f"{len(loadings.swings)} points about a line; {loadings.verdict}",
     )  # fmt: skip
-    named = (("k", found.k), ("bare", found.bare), ("damping", found.damping))
+    named = (("k", loadings.k), ("bare", loadings.bare), ("damping", loadings.damping))
     return Chapter(
         title=title,
-        verdict=found.verdict,
-        sound=found.verdict.startswith("A line"),
+        verdict=loadings.verdict,
+        sound=loadings.verdict.startswith("A line"),
         question=QUESTION,
         parts=(
             Part(
                 "Data: the swings",
-                (recursion, _swing_table(found, kind), *_swing_pictures(found, logs, signals)),
+                (recursion, _swing_table(loadings, kind), *_swing_pictures(loadings, logs, signals)),
                 aside=True,
             ),
             *lost,
-            Part("Fit: the line", (_found_table(found, kind, truth or {}), line)),
+            Part("Fit: the line", (_estimate_table(loadings, kind, truth or {}), line)),
         ),
         steps=tuple(steps),
         numbers={
             **{name: plain_estimate(w) for name, w in named},
             "kind": kind,
-            "verdict": found.verdict,
+            "verdict": loadings.verdict,
             "truth": truth,
             "left_out": left_out,
             "swings": [
                 {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
-                 "sigma": s.decay.sigma, "delta": s.decay.delta} for s in found.swings
+                 "sigma": s.decay.sigma, "delta": s.decay.delta} for s in loadings.swings
             ],
         },
     )  # fmt: skip
 
 
-def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Table:
+def _estimate_table(loadings: Loadings, kind: str, truth: Mapping[str, float]) -> Table:
     """What was found, beside the truth where a twin tells it."""
     named = (
-        ("k", "stiffness", found.k, "stiffness"),
-        (OSCILLATORS[kind].bare, "inertia of the bare body", found.bare, "inertia"),
-        ("c", "viscous friction", found.damping, "damping"),
+        ("k", "stiffness", loadings.k, "stiffness"),
+        (BODIES[kind].bare, "inertia of the bare body", loadings.bare, "inertia"),
+        ("c", "viscous friction", loadings.damping, "damping"),
     )
     rows = tuple(
         (
@@ -195,9 +195,9 @@ def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Tabl
         )
         for name, meaning, w, what in named
     )  # fmt: skip
-    repeat = "" if np.isnan(found.repeat) else f"; repeats of one loading agree to {50 * found.repeat:.2g} %"
+    repeat = "" if np.isnan(loadings.repeat) else f"; repeats of one loading agree to {50 * loadings.repeat:.2g} %"
     return Table(
-        caption=f"From {len(found.swings)} swings" + (f"{repeat} of the frequency" if repeat else ""),
+        caption=f"From {len(loadings.swings)} swings" + (f"{repeat} of the frequency" if repeat else ""),
         headings=(
             "symbol", *(("truth of the twin",) if truth else ()), "value", "std. error", "95 % interval", "unit",
             "meaning",
@@ -206,14 +206,14 @@ def _found_table(found: Loadings, kind: str, truth: Mapping[str, float]) -> Tabl
     )  # fmt: skip
 
 
-def _swing_table(found: Loadings, kind: str) -> Table:
+def _swing_table(loadings: Loadings, kind: str) -> Table:
     rows = tuple(
         (
             s.label, number(s.added), str(s.decay.t.size), number(s.decay.omega_n, 5),
             number(s.decay.omega_error, 2), number(s.decay.decrement, 3), number(s.decay.zeta, 3),
             f"{number(s.decay.delta, 3)} ± {number(s.decay.delta_error, 2)}",
         )
-        for s in found.swings
+        for s in loadings.swings
     )  # fmt: skip
     return Table(
         caption="Every swing; δ in the unit of the log",
@@ -225,10 +225,10 @@ def _swing_table(found: Loadings, kind: str) -> Table:
     )  # fmt: skip
 
 
-def _swing_pictures(found: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str]) -> list[Picture]:
+def _swing_pictures(loadings: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str]) -> list[Picture]:
     """One swing of each loading, and their decrements."""
     first: dict[float, Loaded] = {}
-    for s in found.swings:
+    for s in loadings.swings:
         first.setdefault(s.added, s)
     shown = [first[a] for a in sorted(first)][:MOST_PANELS]
     labels = [s.label.rsplit(", step ", 1)[0] for s in shown]
@@ -253,5 +253,5 @@ def _swing_pictures(found: Loadings, logs: Mapping[str, Record], signals: Mappin
 
 
 def _unit(kind: str, what: str) -> str:
-    body = OSCILLATORS[kind]
-    return body.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit
+    body = BODIES[kind]
+    return body.rig.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit

@@ -18,23 +18,25 @@ if TYPE_CHECKING:
 
 
 @styled
-def line_figure(found: Loadings, what: str) -> Figure:
+def line_figure(loadings: Loadings, what: str) -> Figure:
     """Points of the line with their 95 % bars, the line down to where it meets zero, and what it leaves."""
-    a = np.array([s.added for s in found.swings])
+    a = np.array([s.added for s in loadings.swings])
     drawing = figure(4.4)
     top, left = drawing.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": [3, 1.5]})
-    over = np.array([-found.bare.value, 1.08 * float(a.max())])
-    model = (found.bare.value + a) / found.k.value
-    top.plot(over, (found.bare.value + over) / found.k.value, color=BLUE, label="line, slope 1/k")
-    top.errorbar(a, found.y, 1.96 * found.y_error, fmt="o", color=VERMILLION, markersize=4, capsize=2, label="swings")
+    over = np.array([-loadings.bare.value, 1.08 * float(a.max())])
+    model = (loadings.bare.value + a) / loadings.k.value
+    top.plot(over, (loadings.bare.value + over) / loadings.k.value, color=BLUE, label="line, slope 1/k")
+    top.errorbar(
+        a, loadings.y, 1.96 * loadings.y_error, fmt="o", color=VERMILLION, markersize=4, capsize=2, label="swings"
+    )
     top.axvline(0, color=GREY, linewidth=0.8)
-    top.plot([-found.bare.value], [0], marker="s", color=BLUE, linestyle="none", label="minus the bare inertia")
+    top.plot([-loadings.bare.value], [0], marker="s", color=BLUE, linestyle="none", label="minus the bare inertia")
     top.set_ylabel("1/ω$_n$² [s²]")
     top.set_ylim(bottom=0)
     top.legend(loc="upper left")
     left.axhline(0, color=BLUE)
-    left.errorbar(a, 100 * (found.y / model - 1), 196 * found.y_error / model, fmt="o", color=VERMILLION, markersize=4,
-                  capsize=2)  # fmt: skip
+    left.errorbar(a, 100 * (loadings.y / model - 1), 196 * loadings.y_error / model, fmt="o", color=VERMILLION,
+                  markersize=4, capsize=2)  # fmt: skip
     left.set_ylabel("off the line [%]")
     left.set_xlabel(f"added inertia [{unit(what)}]")
     drawing.align_ylabels([top, left])

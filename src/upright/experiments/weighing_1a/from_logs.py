@@ -1,4 +1,4 @@
-"""Experiment 1a on logs of a rig of one's own, or on those of a twin: what was added is told log by log."""
+"""Experiment 1a on logs of a rig of one's own, or on those of a twin: what was added is named log by log."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from upright.experiments.weighing_1a.run import drawn_twin, measure_body
 from upright.identification.loadings import Loadings
 from upright.records import Record
 from upright.report.page import Chapter, Step
-from upright.rig.makes import OSCILLATORS
+from upright.rig.makes import BODIES
 
 
 def weigh_logs(
@@ -37,7 +37,7 @@ def weigh_logs(
     Raises
     ------
     BadInput
-        When logs and loadings do not match, or a column is not told.
+        When logs and loadings do not match, or a column is not named.
     NotIdentifiable
         When too few swings can be seen.
     """
@@ -61,37 +61,37 @@ def weigh_logs(
         ),
         Step(
             "Plan the next loadings with the error of a frequency that these swings show.",
-            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
+            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {BODIES[kind].unit}"',
         ),
     ]
-    told = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
+    page = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
                            signals=signals, left_out=left_out, steps=steps)  # fmt: skip
-    return weighed, told
+    return weighed, page
 
 
 def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Chapter]:
     """The same of a twin that is stepped here; its logs go into the folder, where one is named."""
-    if kind not in OSCILLATORS:
-        raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
-    done = measure_body(drawn_twin(seed, kind))
-    column = next(iter(done.logs.values())).outputs[0]
-    done = done if folder is None else done.written(folder)
-    files = done.files
-    steps = [Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}")]
+    if kind not in BODIES:
+        raise BadInput(f"--twin is {' or '.join(BODIES)}, got '{kind}'.")
+    result = measure_body(drawn_twin(seed, kind))
+    column = next(iter(result.logs.values())).outputs[0]
+    result = result if folder is None else result.written(folder)
+    files = result.files
+    steps = [Step("See which masses are most informative.", f"upright plan-inertias --rig {kind}")]
     if files:
-        again = f"upright loadings {' '.join(files.values())} {added_options(done, files)}"
+        again = f"upright loadings {' '.join(files.values())} {added_options(result, files)}"
         steps.insert(0, Step("Weigh the rig again from its logs in that folder, as you would your own.", again))
-    told = loading_chapter(
-        done.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=done.logs,
-        signals=dict.fromkeys(done.logs, column), left_out=done.left_out, truth=done.truth, steps=steps,
+    page = loading_chapter(
+        result.loadings, kind=kind, title=f"Experiment 1a on a twin, {kind}, seed {seed}", logs=result.logs,
+        signals=dict.fromkeys(result.logs, column), left_out=result.left_out, truth=result.truth, steps=steps,
     )  # fmt: skip
-    return done.loadings, told
+    return result.loadings, page
 
 
-def _column(record: Record, asked: str, known: tuple[str, ...], option: str) -> str:
-    if asked:
-        _ = record[asked]
-        return asked
+def _column(record: Record, requested: str, known: tuple[str, ...], option: str) -> str:
+    if requested:
+        _ = record[requested]
+        return requested
     if len(known) == 1:
         return known[0]
     raise BadInput(f"The log holds the columns {', '.join(record.names)}; say which one is meant with {option}.")

@@ -39,18 +39,18 @@ def weigh(
     NotIdentifiable
         When too few swings can be seen.
     """
-    found: list[Loaded] = []
+    loaded: list[Loaded] = []
     left_out: list[str] = []
     for (label, record), value in zip(logs.items(), added, strict=True):
         try:
-            seen = swings(record, added=value, label=label, signal=signals[label], command=commands[label])
+            observed = swings(record, added=value, label=label, signal=signals[label], command=commands[label])
         except NotIdentifiable as error:
             left_out.append(str(error))
             continue
-        found += [s for s in seen if not free or s.command == 0]
-    if left_out and len({s.added for s in found}) < 2:
+        loaded += [s for s in observed if not free or s.command == 0]
+    if left_out and len({s.added for s in loaded}) < 2:
         raise NotIdentifiable(left_out[0])
-    return fit_loadings(found, tolerance=tolerance, piece=piece), tuple(left_out)
+    return fit_loadings(loaded, tolerance=tolerance, piece=piece), tuple(left_out)
 
 
 def inertia_of(text: str) -> tuple[float, str]:

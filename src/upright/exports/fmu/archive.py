@@ -60,13 +60,13 @@ def compiled_library(text: str) -> bytes | None:
         file, library = Path(folder) / f"{NAME}.c", Path(folder) / NAME
         file.write_text(text, encoding="utf-8")
         options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden"]
-        done = subprocess.run(
+        compiled = subprocess.run(
             [compiler, *options, str(file), "-o", str(library), "-lm"], capture_output=True, check=False
         )  # fmt: skip
-        if done.returncode:
-            said = (done.stderr.decode(errors="replace").strip() or "nothing said").splitlines()[0]
+        if compiled.returncode:
+            message = (compiled.stderr.decode(errors="replace").strip() or "no message").splitlines()[0]
             raise BadInput(
-                f"the C compiler {compiler} did not make the unit's library: {said}; does it work otherwise?"
+                f"the C compiler {compiler} did not make the unit's library: {message}; does it work otherwise?"
             )
         return library.read_bytes()
 
@@ -79,7 +79,7 @@ def _machine() -> str:
 def model_description(unit: Unit, token: str) -> str:
     """Text of ``modelDescription.xml``."""
     first_line = harmless(unit.rig.basis.first_line())
-    told = f" description={quoteattr(first_line)}" if first_line else ""
+    description = f" description={quoteattr(first_line)}" if first_line else ""
     variables = [
         '    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>'
     ]
@@ -92,7 +92,7 @@ def model_description(unit: Unit, token: str) -> str:
     return "\n".join([
         '<?xml version="1.0" encoding="UTF-8"?>',
         f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(unit.rig.name)} instantiationToken="{token}"',
-        f'    generationTool="upright {__version__}" variableNamingConvention="flat"{told}>',
+        f'    generationTool="upright {__version__}" variableNamingConvention="flat"{description}>',
         f'  <CoSimulation modelIdentifier="{NAME}" canHandleVariableCommunicationStepSize="true"',
         f'      fixedInternalStepSize="{STEP!r}"/>',
         "  <UnitDefinitions>", *(f"    <Unit name={quoteattr(u)}/>" for u in units), "  </UnitDefinitions>",

@@ -202,8 +202,8 @@ EXPORT fmi3Status fmi3DoStep(void *instance, double t, double size, bool no_retu
     if (count < 1 || fabs((double)count * STEP - size) > 1e-6 * STEP)
         return say(rig, fmi3Error, "a step has to be a whole number of milliseconds, in s");
     memcpy(rig->past + PAST * INPUTS, rig->u, sizeof(double) * INPUTS);
-    k_run_1(0, 1, 1, rig->parameters, rig->x, rig->past, NULL, &first, NULL, NULL, count, count, SUBSTEPS, STEP, NULL,
-            1, rig->moved, NULL, rig->w, 0);
+    k_run_1(0, 1, 1, rig->parameters, rig->x, rig->past, NULL, &first, NULL, NULL, 0, count + 1, count, count,
+            SUBSTEPS, STEP, NULL, 1, rig->moved, NULL, rig->w, 0);
     for (i = 0; i < STATES; i++)
         if (!isfinite(rig->moved[STATES + i]))
             return say(rig, fmi3Error, "the motion diverged");
@@ -229,7 +229,7 @@ _REFUSED = (
     "GetNominalsOfContinuousStates", "GetNumberOfEventIndicators", "GetNumberOfContinuousStates", "EnterStepMode",
     "GetOutputDerivatives", "ActivateModelPartition",
 )  # fmt: skip
-"""What FMI 3.0 asks a library to have, and what this unit has nothing of: whoever calls them is told so."""
+"""What FMI 3.0 asks a library to have, and what this unit has nothing of: calls of them say so."""
 
 
 def _nothing(kind: str) -> str:

@@ -210,10 +210,10 @@ class _Writer:
 
     def text(self) -> str:
         known = self.known
-        given = [_declared(known.kinds.get(a, "double"), _name(a)) for a in known.arguments]
-        given += ["double *result_"] if known.gives == "tuple" else []
+        parameters = [_declared(known.kinds.get(a, "double"), _name(a)) for a in known.arguments]
+        parameters += ["double *result_"] if known.gives == "tuple" else []
         result = known.result if known.gives == "number" else "void"
-        head = f"static {result} k_{known.node.name}({', '.join(given)})"
+        head = f"static {result} k_{known.node.name}({', '.join(parameters)})"
         for statement in known.node.body:
             self.statement(statement)
         own = {n: k for n, k in known.kinds.items() if n not in known.arguments}
@@ -346,22 +346,22 @@ class _Writer:
         return f"quotient_l({a}, {b})" if whole else f"floor((double){a} / {b})"
 
     def call(self, name: str, args: list[ast.expr], node: ast.expr) -> str:
-        given = ", ".join(self.value(a) for a in args)
+        values = ", ".join(self.value(a) for a in args)
         if name in self.functions:
-            return f"k_{name}({given})"
+            return f"k_{name}({values})"
         if name in _LIBRARY:
-            return f"{name}({'(double)' if name != 'ldexp' and len(args) == 1 else ''}{given})"
+            return f"{name}({'(double)' if name != 'ldexp' and len(args) == 1 else ''}{values})"
         if name == "frexp":
-            return f"parted_d({given})"
+            return f"parted_d({values})"
         whole = _kind(node, self.known, self.functions) == "long"
         if name == "abs":
-            return f"labs({given})" if whole else f"fabs({given})"
+            return f"labs({values})" if whole else f"fabs({values})"
         if name in ("min", "max"):
-            return f"{'least' if name == 'min' else 'most'}_{'l' if whole else 'd'}({given})"
+            return f"{'least' if name == 'min' else 'most'}_{'l' if whole else 'd'}({values})"
         if name == "round" and len(args) == 1:
-            return f"round_l({given})"
+            return f"round_l({values})"
         if name in ("int", "float"):
-            return f"({'long' if name == 'int' else 'double'})({given})"
+            return f"({'long' if name == 'int' else 'double'})({values})"
         raise _refusal(node)
 
     def element(self, node: ast.Subscript) -> str:

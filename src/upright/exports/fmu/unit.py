@@ -32,12 +32,12 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unit:
-    """A rig and the kernel that moves it; `told` is what the unit has otherwise than the fit, in sentences."""
+    """A rig and the kernel that moves it; `remarks` are the differences from the fit, in sentences."""
 
     rig: Rig
     simulator: Simulator
     values: dict[str, float]
-    told: tuple[str, ...]
+    remarks: tuple[str, ...]
 
     @property
     def remembered(self) -> int:
@@ -58,12 +58,12 @@ class Unit:
     @cached_property
     def states(self) -> list[Variable]:
         """Coordinates, each followed by its speed."""
-        told: list[tuple[str, str, str]] = []
+        rows: list[tuple[str, str, str]] = []
         for c in self.rig.plant.coordinates:
-            told += [(c.name, c.unit, c.meaning), (f"{c.name}_dot", f"{c.unit}/s", f"speed of {c.name}")]
+            rows += [(c.name, c.unit, c.meaning), (f"{c.name}_dot", f"{c.unit}/s", f"speed of {c.name}")]
         return [
             Variable(name=name, unit=unit, meaning=meaning, causality="output", value=0.0, row=i)
-            for i, (name, unit, meaning) in enumerate(told)
+            for i, (name, unit, meaning) in enumerate(rows)
         ]
 
     @cached_property
@@ -101,25 +101,25 @@ def unit_of(rig: Rig) -> Unit:
     BadInput
         When the drive remembers what a unit does not, or more than it can.
     """
-    said, plant = rig.hardware, rig.plant
-    if said.value("relaxation", 0.0):
+    hardware, plant = rig.hardware, rig.plant
+    if hardware.value("relaxation", 0.0):
         raise BadInput(
             "braking that builds up (actuator.relaxation) is remembered from step to step, which the unit does not; "
             "identify without it, or set it to 0 in the fit."
         )
     presliding = {j.presliding for j in plant.joints}
     values = {n: 0.0 if n in presliding else v for n, v in plant.parameters().items()}
-    drive = {f"actuator.{n}": said.value(n, 0.0) for n in ("delay", "lag", "offset")}
-    values = {**values, **rig.more, **drive, GAIN: rig.gain, "actuator.limit": said.value("limit", math.inf)}
+    drive = {f"actuator.{n}": hardware.value(n, 0.0) for n in ("delay", "lag", "offset")}
+    values = {**values, **rig.more, **drive, GAIN: rig.gain, "actuator.limit": hardware.value("limit", math.inf)}
     derived = plant.derived_for(values)
     simulator = Simulator(
         derived=derived, flavour=choose(derived, values), dt=STEP, substeps=substeps(rig, STEP)
     )  # fmt: skip
-    told = (
+    remarks = (
         f"Joint {j.on} slides at once: the unit does not remember how far it has deflected before."
         for j in plant.joints if plant.parameters().get(j.presliding)
     )  # fmt: skip
-    made = Unit(rig=rig, simulator=simulator, values=values, told=tuple(told))
+    made = Unit(rig=rig, simulator=simulator, values=values, remarks=tuple(remarks))
     if made.remembered > LARGEST:
         raise BadInput(
             f"the drive's delay and lag would make the unit remember {made.remembered} commands, and {LARGEST} is the "

@@ -60,13 +60,13 @@ class RigExport:
     kept : callable
         The fit.json that it was read from; one that was only in memory is written into the folder.
     limit : float or None
-        Largest command that was asked for.
+        Requested limit of the command.
     """
 
     rig: Rig
     called: str
     folder: Path
-    kept: Callable[[], Path]
+    store: Callable[[], Path]
     limit: float | None = None
 
 

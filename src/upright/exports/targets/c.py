@@ -204,9 +204,9 @@ void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
 def selftest_header(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.h``."""
     count = len(test.readings)
-    given = _table("given", test.readings, single)
-    asked = _table("asked", test.references, single) if test.references.shape[1] else ""
-    reference, at_first = ("asked[k]", "asked[0]") if asked else ("0", "0")
+    readings = _table("given", test.readings, single)
+    references = _table("asked", test.references, single) if test.references.shape[1] else ""
+    reference, at_first = ("asked[k]", "asked[0]") if references else ("0", "0")
     exact = "0" if single else "LAW_EXACT"
     return f"""\
 /* {count} samples with the commands that upright's own kernel answers, to be replayed wherever the law runs. */
@@ -232,7 +232,7 @@ def selftest_header(test: ReplayVector, *, single: bool) -> str:
    Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start. */
 static long law_selftest(void)
 {{
-{given}{asked}{_table("expected", test.commands, single)}\
+{readings}{references}{_table("expected", test.commands, single)}\
     const law_real allowed = ({exact}) ? 0 : LAW_SINGLE_MISSES;
     static const law_real bad[] = {{NAN, INFINITY, -INFINITY}}, zero[LAW_COMMANDS] = {{0}};
     law_real y[LAW_READINGS], u[LAW_COMMANDS];

@@ -10,17 +10,17 @@ from upright.report.page import Chapter, Part, Points, Step
 from upright.report.symbols import typed
 
 
-def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """The unit, with a library where a C compiler is found."""
-    unit, file = unit_of(asked.rig), asked.folder / "rig.fmu"
+    unit, file = unit_of(export.rig), export.folder / "rig.fmu"
     content, where = archive(unit)
-    warnings = unit.told if where else (*unit.told, "No C compiler was found, so the unit has its sources alone.")
-    taken, given = (", ".join(f"{v.name} [{v.unit or '1'}]" for v in group) for group in (unit.inputs, unit.states))
-    told = Chapter(
-        title=f"{asked.rig.name} for co-simulation", warnings=warnings,
-        verdict=f"{asked.called} is a unit of FMI 3.0" + (f" with a library for {where}." if where else "."),
+    warnings = unit.remarks if where else (*unit.remarks, "No C compiler was found, so the unit has its sources alone.")
+    inputs, outputs = (", ".join(f"{v.name} [{v.unit or '1'}]" for v in group) for group in (unit.inputs, unit.states))
+    page = Chapter(
+        title=f"{export.rig.name} for co-simulation", warnings=warnings,
+        verdict=f"{export.called} is a unit of FMI 3.0" + (f" with a library for {where}." if where else "."),
         parts=(Part("What it takes and gives", (Points((
-            f"Inputs: {taken or 'none'}; outputs: {given}.",
+            f"Inputs: {inputs or 'none'}; outputs: {outputs}.",
             f"Parameters, to be set before the first step: {', '.join(v.name for v in unit.parameters)}; where it "
             f"begins: {', '.join(v.name for v in unit.starts)}.",
             "Steps of whole milliseconds; an input is held for a step.",
@@ -31,7 +31,7 @@ def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
         ),
         numbers={"platform": where},
     )  # fmt: skip
-    return {file.name: content}, told
+    return {file.name: content}, page
 
 
 TARGET = RigTarget(name="fmu", order=45, write=write)

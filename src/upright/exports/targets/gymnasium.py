@@ -48,14 +48,14 @@ if __name__ == "__main__":
     )
 
 
-def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """An environment of Gymnasium, as a module that registers it."""
-    rig, at = asked.rig, asked.folder
-    lanes = Episodes(rig, 1, limit=asked.limit)
-    path, file = asked.kept(), at / "rig_env.py"
-    name, text = module(rig.name, os.path.relpath(path.resolve(), at.resolve()), asked.limit, rig.basis.first_line())
+    rig, at = export.rig, export.folder
+    lanes = Episodes(rig, 1, limit=export.limit)
+    path, file = export.store(), at / "rig_env.py"
+    name, text = module(rig.name, os.path.relpath(path.resolve(), at.resolve()), export.limit, rig.basis.first_line())
     drawn = f"every episode has one of {len(rig.draws)} rigs drawn from its covariance"
-    told = Chapter(
+    page = Chapter(
         title=f"{rig.name} for Gymnasium",
         verdict=f"{path} is the environment {name}" + (f"; {drawn}." if rig.draws else "."),
         parts=(
@@ -72,7 +72,7 @@ def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
         ),
         numbers={"environment": name, "draws": len(rig.draws)},
     )  # fmt: skip
-    return {file.name: text.encode()}, told
+    return {file.name: text.encode()}, page
 
 
 TARGET = RigTarget(name="gymnasium", order=35, write=write, limited=True, draws=DRAWS)

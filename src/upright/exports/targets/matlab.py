@@ -57,12 +57,12 @@ end
 def selftest_function(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.m``."""
     with_r, first_r = (", asked(k, :)", ", asked(1, :)") if test.references.shape[1] else ("", "")
-    asked = _table("asked", test.references) if with_r else ""
+    references = _table("asked", test.references) if with_r else ""
     return f"""\
 function law_selftest()
 % Compares the commands of a replay with those that upright's own kernel answers.
 % Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start.
-{_table("given", test.readings)}{asked}{_table("expected", test.commands)}\
+{_table("given", test.readings)}{references}{_table("expected", test.commands)}\
     allowed = {f"{test.single if single else 0.0:.17g}"};
     wrong = 'law: sample %d is not the expected one; do not run it';
     bad = [NaN, Inf, -Inf];

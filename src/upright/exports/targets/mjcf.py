@@ -10,15 +10,15 @@ from upright.report.page import Chapter, Step
 from upright.report.symbols import typed
 
 
-def write(asked: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """A model of MuJoCo, and what MuJoCo has otherwise."""
-    text, told = model(asked.rig)
-    file = asked.folder / "rig.xml"
-    viscous = "springs, viscous friction and the drive are those of the fit" + "." * (not told)
+    text, remarks = model(export.rig)
+    file = export.folder / "rig.xml"
+    viscous = "springs, viscous friction and the drive are those of the fit" + "." * (not remarks)
     chapter = Chapter(
-        title=f"{asked.rig.name} for MuJoCo", verdict=f"{asked.called} is written as MJCF; {viscous}"
-        + (", and what MuJoCo has otherwise is said below." if told else ""), warnings=told,
-        numbers={"remarks": list(told)},
+        title=f"{export.rig.name} for MuJoCo", verdict=f"{export.called} is written as MJCF; {viscous}"
+        + (", and differences in MuJoCo are listed below." if remarks else ""), warnings=remarks,
+        numbers={"remarks": list(remarks)},
         steps=(Step("Look at it.", f"pip install mujoco && python -m mujoco.viewer --mjcf={typed(file)}"),),
     )  # fmt: skip
     return {file.name: text.encode()}, chapter

@@ -31,7 +31,7 @@ def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
     measured = sorted({c for run in runs for c in run.measured if c not in run.held})
     angles = {c.name for c in rig.plant.coordinates if c.unit == "rad"}
     driven = any(run.u.size and run.u.any() for run in runs)
-    best, found = declared, ({}, {})
+    best, changes = declared, ({}, {})
     for signs in itertools.product((1.0, -1.0), repeat=len(measured)):
         for turned in itertools.product((0.0, math.pi), repeat=len(measured)):
             flips = dict(zip(measured, signs, strict=True))
@@ -42,18 +42,18 @@ def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
                 continue
             left = _unexplained(rig, runs, flips, turns)
             if left < CLOSER * best:
-                best, found = left, (flips, turns)
+                best, changes = left, (flips, turns)
     if best > CLEAR * min(declared, 1.0):  # what explains next to nothing is no better convention
         return ()
-    flips, turns = found
-    said = [
-        f"set sign = -1 for {c}, or take it out where it is said (the sign looks reversed)"
+    flips, turns = changes
+    advice = [
+        f"set sign = -1 for {c}, or take it out where it stands (the sign looks reversed)"
         for c, s in flips.items()
         if s < 0
     ]
-    said += [f"add an offset of pi to {c} (its zero looks upright)" for c in turns]
+    advice += [f"add an offset of pi to {c} (its zero looks upright)" for c in turns]
     now, then = 100 * (1 - min(declared, 1.0)), 100 * (1 - best)
-    what = " and ".join(said)
+    what = " and ".join(advice)
     return (
         f"The conventions look wrong: {what}; the accelerations are then explained to {then:.0f} % "
         f"instead of {now:.0f} %.",

@@ -5,7 +5,7 @@ measured state and the fitted model says where it should be half a swing later. 
 while the misfit of a free run lives on until the swing has died. A stretch that is missed far more than the other runs
 are is no fault of the model, since that errs alike in all.
 
-Both answers are told: what the numbers are without such a stretch, and what they would have been with it.
+Both answers are reported: what the numbers are without such a stretch, and what they would have been with it.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ Array = NDArray[np.float64]
 def without_spikes(run: Run) -> tuple[Run, list[tuple[float, str]]]:
     """The run with its spikes replaced by what stands beside them, and when they were in which coordinate."""
     y = run.y.copy()
-    found: list[tuple[float, str]] = []
+    places: list[tuple[float, str]] = []
     for k, c in enumerate(run.measured):
         at = spikes(run.y[:, k], run.quanta[k])
         y[:, k] = without(run.y[:, k], at)
-        found += [(float(t), c) for t in run.t[at]]
-    return (replace(run, y=y) if found else run), found
+        places += [(float(t), c) for t in run.t[at]]
+    return (replace(run, y=y) if places else run), places
 
 
 FAR = 4.0
@@ -51,7 +51,7 @@ Measured with it: no alarm on 138 clean swings of random pendulums, half of them
 """
 
 MOST = 99
-"""How many times more a stretch is missed is told up to here; beyond, what the others miss is next to nothing."""
+"""How many times more a stretch is missed is reported up to here; beyond, what the others miss is next to nothing."""
 
 STILL = 0.03
 """A stretch that varies by less than this share says nothing about how well motion is predicted."""
@@ -98,29 +98,29 @@ def outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run]) -> tuple[Outlier, ...]
     Parameters
     ----------
     fit : Fit
-        The model; `rig` is what it was asked about.
+        The model; `rig` is the requested one.
     runs : sequence of Run
         Those that were fitted and any others of the same rig. A run under a loop is only searched for spikes, since
         what its law remembers is not in the log; so is a predicted one with numbers of its own, since those are not in
         the fit.
     """
-    found: list[Outlier] = []
-    seen: list[Stretches] = []
+    out: list[Outlier] = []
+    stretches: list[Stretches] = []
     known = rig.with_values({n: e.value for n, e in fit.estimates.items()})
     for run in runs:
         clean, jumped = without_spikes(run)
         if jumped:
-            found.append(_spiky(run, jumped))
+            out.append(_spiky(run, jumped))
         own = _estimated_for(fit, run)
         missing = {*run.unknown, *run.shared} - {"initial", *own}
         blind = run.loop is not None or (run.role != "fit" and missing)
         halves = None if blind else half_swings(known, clean, own)
         if halves is not None:
-            seen.append(halves)
-    spread = _spread([s.run for s in seen])
-    for s in seen:
-        found += _strange(s, _judges(s, seen), spread)
-    return tuple(sorted(found, key=lambda o: ([r.label for r in runs].index(o.run), o.start)))
+            stretches.append(halves)
+    spread = _spread([s.run for s in stretches])
+    for s in stretches:
+        out += _strange(s, _judges(s, stretches), spread)
+    return tuple(sorted(out, key=lambda o: ([r.label for r in runs].index(o.run), o.start)))
 
 
 def half_swings(known: GreyBox, run: Run, own: Mapping[str, float]) -> Stretches | None:
@@ -183,22 +183,22 @@ def _spread(runs: Sequence[Run]) -> dict[str, float]:
     return {c: float(np.median(v)) for c, v in every.items()}
 
 
-def _judges(s: Stretches, seen: Sequence[Stretches]) -> list[Stretches]:
+def _judges(s: Stretches, stretches: Sequence[Stretches]) -> list[Stretches]:
     """Runs that a run is held against: the others, and itself where it is alone.
 
     A fitted run is held against fitted ones: one that the model was never asked to explain may be missed for reasons of
     its own, or hardly for being small, and the only run that was fitted is what the model knows.
     """
-    others = [o for o in seen if o is not s and (s.run.role != "fit" or o.run.role == "fit")]
+    others = [o for o in stretches if o is not s and (s.run.role != "fit" or o.run.role == "fit")]
     return others or [s]
 
 
 def _usual(s: Stretches, judges: Sequence[Stretches], c: str, spread: float) -> float:
     """Upper quartile of what a run's judges miss of a coordinate while it moves; its own where they tell nothing."""
-    for asked in (judges, [s]):
+    for group in (judges, [s]):
         missed = [
             o.missed[o.moved[:, k] > STILL * spread, k]
-            for o in asked
+            for o in group
             for k, name in enumerate(o.run.measured)
             if name == c
         ]
@@ -216,20 +216,20 @@ def _strange(s: Stretches, judges: Sequence[Stretches], spread: Mapping[str, flo
         usual = max(_usual(s, judges, c, spread[c]), 1e-3 * spread[c])
         far |= s.missed[:, k] > max(FAR * usual, LEAST * spread[c], 5 * s.resolution[k])
         times = np.maximum(times, s.missed[:, k] / usual)
-    found: list[Outlier] = []
+    out: list[Outlier] = []
     for first, last in stretches(far, gap=2):
         here = slice(first, last + 1)
         size = float(times[here].max())
-        told = f"missed {size:.2g} times as much as the other stretches"
+        evidence = f"missed {size:.2g} times as much as the other stretches"
         if not math.isfinite(size):
-            told = "the simulation runs away there"
+            evidence = "the simulation runs away there"
         elif size < FAR:  # far by the resolution or the signal's size alone
-            told = "missed, and the other stretches are not"
+            evidence = "missed, and the other stretches are not"
         elif size > MOST:
-            told = f"missed more than {MOST} times as much as the other stretches"
+            evidence = f"missed more than {MOST} times as much as the other stretches"
         lasting, grown = _lasts(s, first, last)
         if lasting:
-            reason, told = SELF_EXCITED, f"{grown}; {told}"
+            reason, evidence = SELF_EXCITED, f"{grown}; {evidence}"
         elif np.count_nonzero(far[here]) >= GROWS:
             reason = UNEXPLAINED
         elif not np.any(far[here] & s.constant[here]):
@@ -238,9 +238,9 @@ def _strange(s: Stretches, judges: Sequence[Stretches], spread: Mapping[str, flo
             reason = TOUCHED.format("start" if first < 2 else "end")
         else:
             reason = BUMPED
-        found.append(Outlier(run=s.run.label, start=float(s.start[first]), stop=float(s.stop[last]), reason=reason,
-                             evidence=told))  # fmt: skip
-    return found
+        out.append(Outlier(run=s.run.label, start=float(s.start[first]), stop=float(s.stop[last]), reason=reason,
+                             evidence=evidence))  # fmt: skip
+    return out
 
 
 def _lasts(s: Stretches, first: int, last: int) -> tuple[bool, str]:
@@ -304,35 +304,35 @@ def refit_without_outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run], again: C
 
     Reasons are those that the last model gives: the first one was bent by what it had to explain.
     """
-    found = outliers(fit, rig, runs)
-    first, kept = fit, list(runs)
+    strange = outliers(fit, rig, runs)
+    first, retained = fit, list(runs)
     for _ in range(2):
-        left = without_outliers(runs, found)
-        if not any(r.role == "fit" for r in left) or _same(left, kept):
+        left = without_outliers(runs, strange)
+        if not any(r.role == "fit" for r in left) or _same(left, retained):
             break
-        kept, new = left, again(left)
+        retained, new = left, again(left)
         if explains_worse(new, first):
-            told = tuple(f"Outlier: {o.sentence}" for o in found)
-            return replace(first, warnings=(*first.warnings, *told, STAYS))
+            sentences = tuple(f"Outlier: {o.sentence}" for o in strange)
+            return replace(first, warnings=(*first.warnings, *sentences, STAYS))
         fit = new
         if fit.interrupted:
             break
-        found = outliers(fit, rig, runs) or found
-    if not found:
+        strange = outliers(fit, rig, runs) or strange
+    if not strange:
         return first
-    told = [f"Outlier: {o.sentence}" for o in found]
+    sentences = [f"Outlier: {o.sentence}" for o in strange]
     if fit is first:
-        return replace(fit, warnings=(*fit.warnings, *told))
+        return replace(fit, warnings=(*fit.warnings, *sentences))
     absent = [r for r in runs if r.label not in fit.runs and (r.role == "fit" or not fit.interrupted)]
     missing = [replace(r, role="predict") for r in absent]
     scores = {**fit.runs, **predict(fit, rig, missing)}
     known = [r.label for r in runs]
     order = sorted(scores, key=lambda label: next((i for i, k in enumerate(known) if label.startswith(k)), len(known)))
-    names = ", ".join(dict.fromkeys(o.run for o in found))
+    names = ", ".join(dict.fromkeys(o.run for o in strange))
     return replace(
         fit,
         runs={label: scores[label] for label in order},
-        warnings=(*fit.warnings, *told, _compared(first, fit)),
+        warnings=(*fit.warnings, *sentences, _compared(first, fit)),
         verdict=f"{fit.verdict} Left out of the fit as outliers, or in part: {names}; see the warnings.",
         seconds=first.seconds + fit.seconds,
         evaluations=first.evaluations + fit.evaluations,
@@ -365,26 +365,26 @@ def _compared(before: Fit, after: Fit) -> str:
     return f"With the outliers in it would have been {', '.join(moved)}."
 
 
-def without_outliers(runs: Sequence[Run], found: Sequence[Outlier]) -> list[Run]:
+def without_outliers(runs: Sequence[Run], strange: Sequence[Outlier]) -> list[Run]:
     """The runs with spikes taken out, and fitted ones cut into what stands before and after each stretch.
 
     What is left of a run is dropped when it is shorter than a third of it or than 50 samples, or hardly moves. A run
     that excites itself is dropped whole: it does so before one can see it.
     """
-    kept: list[Run] = []
+    retained: list[Run] = []
     for run in runs:
-        spans = sorted((o.start, o.stop) for o in found if o.run == run.label and o.reason != SPIKES)
-        spiky = any(o.run == run.label and o.reason == SPIKES for o in found)
+        spans = sorted((o.start, o.stop) for o in strange if o.run == run.label and o.reason != SPIKES)
+        spiky = any(o.run == run.label and o.reason == SPIKES for o in strange)
         clean = without_spikes(run)[0] if spiky else run
         if run.role != "fit" or not spans:
-            kept.append(clean)
+            retained.append(clean)
             continue
-        if any(o.run == run.label and o.reason == SELF_EXCITED for o in found):
+        if any(o.run == run.label and o.reason == SELF_EXCITED for o in strange):
             continue
         edges = [float(run.t[0]) - 1, *(e for span in spans for e in span), float(run.t[-1]) + 1]
         for a, b in zip(edges[::2], edges[1::2], strict=True):
             part = np.flatnonzero((run.t > a) & (run.t < b))
             moves = part.size > 0 and np.any(np.ptp(clean.y[part], axis=0) > MOVES * np.ptp(clean.y, axis=0))
             if moves and part.size >= max(LEAST_SAMPLES, run.t.size * WORTH):
-                kept.append(part_of_run(clean, int(part[0]), int(part[-1]) + 1))
-    return kept
+                retained.append(part_of_run(clean, int(part[0]), int(part[-1]) + 1))
+    return retained

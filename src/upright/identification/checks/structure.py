@@ -1,8 +1,8 @@
 """Which spring, offset, lean or drag, left out of the model, would explain runs that it does not explain?
 
-Every number that plant and drive may have and that the model leaves at nothing is asked for in turn. Accelerations,
+Every number that plant and drive may have and that the model leaves at nothing is tried in turn. Accelerations,
 which need no simulation, say which first: what pulls slowly hardly shows in them, yet it stands before all that is not
-there. The first ones are then fitted, and what they gain is told.
+there. The first ones are then fitted, and what they gain is reported.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ CLEAR = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """Numbers that the model leaves out, their values when they are asked for, and the least fit percent then."""
+    """Numbers that the model leaves out, their estimates, and the least fit percent then."""
 
     values: Mapping[str, float]
     reached: float
@@ -51,15 +51,15 @@ def with_proposal(fit: Fit, runs: Sequence[Run]) -> Fit:
     worst = _worst(r.fit_percent for r in fit.runs.values() if r.role == "fit")
     if fit.interrupted or fit.failed or worst >= GOOD:
         return fit
-    found = proposed(fit.model, runs, worst)
-    if found is None:
+    proposal = proposed(fit.model, runs, worst)
+    if proposal is None:
         return fit
-    told = sentence(found, fit.model, worst)
+    advice = sentence(proposal, fit.model, worst)
     first, *others = fit.answers
-    answers = (replace(first, reasons=(told, *first.reasons)), *others)
+    answers = (replace(first, reasons=(advice, *first.reasons)), *others)
     verdict = " ".join([*(a.text() for a in answers), *assumption_sentences(fit.assumptions)])
     return replace(
-        fit, answers=answers, verdict=verdict, warnings=(*fit.warnings, told), proposed=dict(found.values)
+        fit, answers=answers, verdict=verdict, warnings=(*fit.warnings, advice), proposed=dict(proposal.values)
     )  # fmt: skip
 
 
@@ -69,8 +69,8 @@ def proposed(rig: GreyBox, runs: Sequence[Run], worst: float) -> Proposal | None
     while best is None or (best.reached < GOOD and len(best.values) < 2):
         reached, known = (worst, {}) if best is None else (best.reached, best.values)
         tried = missing_numbers(with_numbers(rig, known), runs)[:FITTED]
-        found = (_fitted(with_numbers(rig, {**known, **values}), (*known, *values), runs) for values in tried)
-        better = next((p for p in found if 100 - p.reached < CLEAR * (100 - reached)), None)
+        proposals = (_fitted(with_numbers(rig, {**known, **values}), (*known, *values), runs) for values in tried)
+        better = next((p for p in proposals if 100 - p.reached < CLEAR * (100 - reached)), None)
         if better is None:
             break
         best = better
@@ -83,14 +83,14 @@ def missing_numbers(rig: GreyBox, runs: Sequence[Run]) -> list[dict[str, float]]
     if not samples or not rig.estimated:
         return []
     base = regress(rig, samples)
-    found: list[tuple[float, dict[str, float]]] = []
+    candidates: list[tuple[float, dict[str, float]]] = []
     for names in _left_out(rig):
         start = _start(rig, names, samples, base.values)
         if start:
             agreement = regress(with_numbers(rig, start), samples)
-            found.append((agreement.unexplained, {n: agreement.values[n] for n in names}))
-    found.sort(key=lambda one: one[0])
-    return [values for unexplained, values in found if unexplained < (1 - FELT) * base.unexplained]
+            candidates.append((agreement.unexplained, {n: agreement.values[n] for n in names}))
+    candidates.sort(key=lambda one: one[0])
+    return [values for unexplained, values in candidates if unexplained < (1 - FELT) * base.unexplained]
 
 
 def _start(
@@ -112,25 +112,25 @@ def _start(
 def with_numbers(rig: GreyBox, values: Mapping[str, float]) -> GreyBox:
     """The rig with these numbers to estimate, from these values."""
     command = rig.parameters["actuator.limit"].unit if "actuator.limit" in rig.parameters else "1"
-    asked = {
+    added = {
         n: replace(rig.parameters.get(n, Parameter(name=n, value=0.0, unit=command)), value=v, estimate=True)
         for n, v in values.items()
     }
-    return replace(rig, parameters={**rig.parameters, **asked})
+    return replace(rig, parameters={**rig.parameters, **added})
 
 
-def sentence(found: Proposal, rig: GreyBox, worst: float) -> str:
+def sentence(proposal: Proposal, rig: GreyBox, worst: float) -> str:
     """What is missing, what it gains, and what to write into the study."""
-    asked = with_numbers(rig, found.values).parameters
-    meant = " and ".join(f"{n} ({_meaning(rig, n)})" for n in found.values)
+    parameters = with_numbers(rig, proposal.values).parameters
+    meant = " and ".join(f"{n} ({_meaning(rig, n)})" for n in proposal.values)
     lines = " and ".join(
-        f'{n.rpartition(".")[2]} = {{ guess = "{v:.3g} {asked[n].unit}" }} under '
+        f'{n.rpartition(".")[2]} = {{ guess = "{v:.3g} {parameters[n].unit}" }} under '
         f"{'[actuator]' if n in ACTUATOR else '[parameters]'}"
-        for n, v in found.values.items()
+        for n, v in proposal.values.items()
     )
     return (
-        f"Something is missing from the model: with {meant} it explains at least {found.reached:.1f} % of the fitted "
-        f"runs instead of {worst:.1f}. Ask for it: {lines}."
+        f"Something is missing from the model: with {meant} it explains at least {proposal.reached:.1f} % of the "
+        f"fitted runs instead of {worst:.1f}. Ask for it: {lines}."
     )
 
 
@@ -141,11 +141,11 @@ def _meaning(rig: GreyBox, name: str) -> str:
 def _fitted(rig: GreyBox, names: Sequence[str], runs: Sequence[Run]) -> Proposal:
     problem = formulate(rig, runs)
     starts = [problem.place(s) for s in closed_form_starts(rig, runs)] or [problem.start]
-    found = search(problem, starts, SearchLog(), patient=False)
-    if not math.isfinite(found.normal.cost):
+    end = search(problem, starts, SearchLog(), patient=False)
+    if not math.isfinite(end.normal.cost):
         return Proposal(values={}, reached=-math.inf)
-    values = problem.values_at(found.x)
-    reached = _worst(score_run(problem, i, found.x).fit_percent for i in range(len(problem.tracks)))
+    values = problem.values_at(end.x)
+    reached = _worst(score_run(problem, i, end.x).fit_percent for i in range(len(problem.tracks)))
     return Proposal(values={n: float(values[n]) for n in names}, reached=reached)
 
 

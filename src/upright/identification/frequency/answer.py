@@ -32,7 +32,7 @@ POOR = 9.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrequencyFit:
-    """Everything that follows from one response, measured `at` an equilibrium of a rig as it was known and asked.
+    """Everything that follows from one response, measured `at` an equilibrium of a rig as known and requested.
 
     `used` are the points of the `data` that were fitted, `left_out` says why the others were not. `fit` is for
     `fit.json`: estimates with covariance, poles at every equilibrium, verdict. `key` is the pole that a design has to
@@ -68,9 +68,9 @@ def explain(
     seed : int
         Of the starts of least squares.
     tell : callable, optional
-        Told the step at work and its share done.
+        Called with the current step and its share completed.
     stopped : callable
-        Asked between the fits.
+        Called between the fits: whether to stop.
 
     Raises
     ------
@@ -78,8 +78,8 @@ def explain(
         When too few frequencies can be used.
     """
     Balance(plant=rig.plant, at=at, data=data)  # are its outputs coordinates of this plant?
-    kept, left_out = usable(data, dry=_has_dry(rig))
-    used = data.only(kept)
+    usable_rows, left_out = usable(data, dry=_has_dry(rig))
+    used = data.only(usable_rows)
     if len(used) < 4:
         raise NotIdentifiable(
             f"{len(used)} usable frequencies are too few for a fit; measure more. {' '.join(left_out)}"
@@ -90,9 +90,9 @@ def explain(
     simplex = simplex_dB(rig, at, used, tell=tell)
     q = student(squares.freedom)
     values = squares.way.values
-    found = poles(rig, values, list(squares.names), squares.covariance, q)
-    key = _key(found, at)
-    fit = _fit(rig, squares, found, key, q, left_out)
+    by_equilibrium = poles(rig, values, list(squares.names), squares.covariance, q)
+    key = _key(by_equilibrium, at)
+    fit = _fit(rig, squares, by_equilibrium, key, q, left_out)
     other = poles(rig, simplex.values, [], np.zeros((0, 0)), q)
     there = next((p for p in other.get(key[0], ()) if _what(p) == key[1]), None)
     reached = complex(there.real.value, there.imag.value) if there is not None else complex(math.nan, math.nan)
@@ -112,13 +112,13 @@ def _what(p: Pole) -> str:
     return "mode" if p.imag.value > 0 else ""
 
 
-def _key(found: Mapping[str, tuple[Pole, ...]], at: str) -> tuple[str, str, Pole]:
+def _key(by_equilibrium: Mapping[str, tuple[Pole, ...]], at: str) -> tuple[str, str, Pole]:
     """The pole by which it falls, or the mode that swings fastest where it was measured."""
-    falling = [(name, p) for name, ps in found.items() for p in ps if _what(p) == "unstable pole"]
+    falling = [(name, p) for name, ps in by_equilibrium.items() for p in ps if _what(p) == "unstable pole"]
     if falling:
         name, p = max(falling, key=lambda pair: pair[1].real.value)
         return name, "unstable pole", p
-    here = found.get(at, ())
+    here = by_equilibrium.get(at, ())
     if not here:
         raise NotIdentifiable("The fitted rig has no equilibrium to stand at; check what was taken as known.")
     swinging = [p for p in here if _what(p) == "mode"]
@@ -127,7 +127,7 @@ def _key(found: Mapping[str, tuple[Pole, ...]], at: str) -> tuple[str, str, Pole
 
 
 def key_value(key: tuple[str, str, Pole]) -> Estimate:
-    """The number of the key pole that is told: its real part when it grows, its frequency when it swings."""
+    """The number of the key pole that is reported: its real part when it grows, its frequency when it swings."""
     return key[2].real if key[1] == "unstable pole" else key[2].imag
 
 
@@ -140,8 +140,8 @@ def digits(number: Estimate) -> int:
 
 
 def _fit(
-    rig: GreyBox, squares: Squares, found: Mapping[str, tuple[Pole, ...]], key: tuple[str, str, Pole], q: float,
-    left_out: tuple[str, ...],
+    rig: GreyBox, squares: Squares, by_equilibrium: Mapping[str, tuple[Pole, ...]], key: tuple[str, str, Pole],
+    q: float, left_out: tuple[str, ...],
 ) -> Fit:  # fmt: skip
     sigma = np.sqrt(np.maximum(np.diag(squares.covariance), 0.0))
     estimates: dict[str, Estimate] = {}
@@ -155,15 +155,15 @@ def _fit(
         low, high = value - q * s, value + q * s
         weak = high - low > abs(value) or Estimate.within(value, s, q * s).zero_wide
         bound = value < 1e-6 * rig.parameters[name].value
-        status = "at bound" if bound else "weak" if weak else "firm"
+        status = "at bound" if bound else "poorly determined" if weak else "well determined"
         estimates[name] = Estimate(value=value, stderr=s, interval=(max(low, 0.0), high), unit=unit, status=status)
     size = np.where(sigma > 0, sigma, 1.0)  # what the response does not depend on has no variance
-    told, trusted = verdict(squares, key)
+    sentence, trusted = verdict(squares, key)
     return Fit(
-        model=rig, estimates=estimates, per_run={}, runs={}, verdict=told, trusted=trusted,
+        model=rig, estimates=estimates, per_run={}, runs={}, verdict=sentence, trusted=trusted,
         method="least squares on the complex response", evaluations=squares.way.evaluations,
         seconds=squares.way.seconds, cost=squares.misfit * squares.freedom, names=squares.names,
-        correlation=squares.covariance / np.outer(size, size), warnings=left_out, poles=found,
+        correlation=squares.covariance / np.outer(size, size), warnings=left_out, poles=by_equilibrium,
     )  # fmt: skip
 
 
@@ -175,26 +175,26 @@ def verdict(squares: Squares, key: tuple[str, str, Pole]) -> tuple[str, bool]:
     low, high = number.interval
     name = f"The unstable pole at '{at}'" if what == "unstable pole" else f"The fastest mode at '{at}'"
     d = digits(number)
-    said = f"{name} is {number.value:.{d}g} {unit}, 95 % interval {low:.{d}g} to {high:.{d}g}."
+    text = f"{name} is {number.value:.{d}g} {unit}, 95 % interval {low:.{d}g} to {high:.{d}g}."
     if squares.misfit > POOR:
         return (
             f"The model leaves {math.sqrt(squares.misfit):.1f} times the errors stated unexplained, and intervals are "
-            f"widened by that: a part of the rig is missing in it, or an encoder shows another scale than said. {said}"
+            f"widened by that: a part of the rig is missing in it, or an encoder has a wrong scale. {text}"
         ), False
     odd = max(squares.surprise, key=lambda n: abs(squares.surprise[n]), default="")
     if odd and abs(squares.surprise[odd]) > ODD:
         return (
             f"The response contradicts what is known of {odd}: it would have to be {squares.way.values[odd]:.4g}, "
             f"{abs(squares.surprise[odd]):.0f} times its tolerance away. Was it measured wrongly, or does an encoder "
-            f"show another scale than said? {said}"
+            f"have a wrong scale? {text}"
         ), False
     if 2 * squares.reached < squares.starts:
         few = f"Only {squares.reached} of {squares.starts} starts reached this minimum; there may be a lower one."
-        return f"{few} {said}", False
+        return f"{few} {text}", False
     share = (high - low) / 2 / abs(number.value)
     if share > 0.05:
-        return f"{said} That is {100 * share:.2g} % either way, too wide to design from: measure closer to it.", False
-    return said, True
+        return f"{text} That is {100 * share:.2g} % either way, too wide to design from: measure closer to it.", False
+    return text, True
 
 
 def curves(answer: FrequencyFit) -> tuple[tuple[Array, Complex], tuple[Array, Complex]]:

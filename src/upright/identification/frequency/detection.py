@@ -198,7 +198,7 @@ def settled(lines: Complex, *, tolerance: float = 2e-3, noise: Array | float = 0
 
 
 def sign_line(t: Array, y: Array, omega: float, guess: Array) -> complex | None:
-    """First line of the speed's sign, from where a signal without drift turns; None when that cannot be told.
+    """First line of the speed's sign, from where a signal without drift turns; None when that is not clear.
 
     Parameters
     ----------
@@ -213,13 +213,13 @@ def sign_line(t: Array, y: Array, omega: float, guess: Array) -> complex | None:
     if change.size != 2:
         return None
     phase = np.mod(omega * t, 2 * math.pi)
-    found: list[float] = []
+    apexes: list[float] = []
     for k in change:
         apex = _apex(phase, y, 2 * math.pi * (k + 0.5) / guess.size)
         if apex is None:
             return None
-        found.append(apex)
-    rising = found if guess[(change[0] + 1) % guess.size] > 0 else found[::-1]
+        apexes.append(apex)
+    rising = apexes if guess[(change[0] + 1) % guess.size] > 0 else apexes[::-1]
     low, high = rising  # speed above zero from the least position on to the greatest
     return complex(2 / math.pi * 1j * (np.exp(-1j * high) - np.exp(-1j * low)))
 

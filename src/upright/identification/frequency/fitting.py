@@ -140,7 +140,7 @@ def coordinates(rig: GreyBox, *, magnitude: bool = False) -> Coordinates:
         When nothing is sought, or a guess is no size.
     """
     dry = {n for j in rig.plant.joints for n in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding)}
-    found: list[tuple[Parameter, bool]] = []
+    chosen: list[tuple[Parameter, bool]] = []
     base = {n: p.value for n, p in rig.parameters.items()}
     for name, p in rig.parameters.items():
         if magnitude and name in dry:
@@ -152,14 +152,14 @@ def coordinates(rig: GreyBox, *, magnitude: bool = False) -> Coordinates:
         always = name == "actuator.gain" or (name in rig.plant.names() and rig.plant.quantity(name).open_lower)
         if not (p.value > 0 and math.isfinite(p.value)):
             raise BadInput(f"{name} is sought and needs a guess above 0, got {p.value:g}; give its order of magnitude.")
-        found.append((p, always or magnitude))
-    if not found:
+        chosen.append((p, always or magnitude))
+    if not chosen:
         raise BadInput("nothing is sought; name at least one parameter to estimate.")
     return Coordinates(
-        names=tuple(p.name for p, _ in found),
-        size=np.array([p.value for p, _ in found]),
-        log=np.array([log for _, log in found]),
-        tolerance=np.array([p.uncertainty / p.value if p.uncertainty > 0 else math.inf for p, _ in found]),
+        names=tuple(p.name for p, _ in chosen),
+        size=np.array([p.value for p, _ in chosen]),
+        log=np.array([log for _, log in chosen]),
+        tolerance=np.array([p.uncertainty / p.value if p.uncertainty > 0 else math.inf for p, _ in chosen]),
         base=base,
     )
 
@@ -168,11 +168,11 @@ def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.boo
     """Frequencies to fit, and sentences about those left out: joints that stick, points drowned in noise."""
     noisy = data.coherence.min(axis=1) < 0.5
     stuck = (data.still.max(axis=1) > STICKS) & dry
-    told: list[str] = []
+    notes: list[str] = []
     for mask, why in ((stuck, "a joint sticks there for part of each period"), (noisy & ~stuck, "it is mostly noise")):
         if mask.any():
-            told.append(f"Left out at {', '.join(f'{w:.3g}' for w in data.omega[mask])} rad/s: {why}.")
-    return ~(noisy | stuck), tuple(told)
+            notes.append(f"Left out at {', '.join(f'{w:.3g}' for w in data.omega[mask])} rad/s: {why}.")
+    return ~(noisy | stuck), tuple(notes)
 
 
 def simplex_dB(rig: GreyBox, at: str, data: FrequencyResponse, *, tell: Progress = silent, limit: int = 1500) -> Way:
@@ -196,8 +196,8 @@ def simplex_dB(rig: GreyBox, at: str, data: FrequencyResponse, *, tell: Progress
         for _ in range(RESTARTS):  # a simplex that has collapsed is spread anew, as long as that helps
             corners = np.vstack([z, z + 0.2 * np.eye(z.size)])
             options = {"initial_simplex": corners, "maxfev": limit, "adaptive": True, "xatol": 1e-3, "fatol": 1e-3}
-            found = minimize(squares, z, args=(columns,), method="Nelder-Mead", options=options)
-            z, before, cost = np.asarray(found.x), cost, float(found.fun)
+            solution = minimize(squares, z, args=(columns,), method="Nelder-Mead", options=options)
+            z, before, cost = np.asarray(solution.x), cost, float(solution.fun)
             if cost > 0.99 * before - 1e-3:
                 break
         return z, cost
@@ -251,8 +251,8 @@ def least_squares(
     ends: list[tuple[float, Array]] = []
     for i in range(starts):
         z = space.start if i == 0 else space.scattered(rng, SPREAD)
-        found = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
-        ends.append((float(found.cost), np.asarray(found.x)))
+        solution = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
+        ends.append((float(solution.cost), np.asarray(solution.x)))
         tell("least squares, several starts", (i + 1) / starts)
     cost, z = min(ends, key=lambda end: end[0])
     reached = sum(c < 1.02 * cost + 1.0 for c, _ in ends)
@@ -260,8 +260,8 @@ def least_squares(
         values = space.values(z)
         without = replace(balance, plain_friction=True).response(values)[0]
         sigma = _sigma(data, balance.response(values)[0], without)
-        found = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
-        z = np.asarray(found.x)
+        solution = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
+        z = np.asarray(solution.x)
     J, rows = jacobian(z), 2 * data.response.size
     r = residual(z)[:rows]
     free = max(1, rows - space.start.size + len(space.bounded))

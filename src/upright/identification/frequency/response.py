@@ -116,8 +116,8 @@ class FrequencyResponse:
         object.__setattr__(self, "overtones", heard)
 
     def _fill(self, name: str, shape: tuple[int, ...], kind: Any, default: float) -> None:
-        given = np.array(getattr(self, name), dtype=kind)
-        value = given if given.size else np.full(shape, default, dtype=kind)
+        array = np.array(getattr(self, name), dtype=kind)
+        value = array if array.size else np.full(shape, default, dtype=kind)
         if value.shape != shape:
             raise BadInput(f"{name} of a frequency response needs shape {shape}, got {value.shape}.")
         object.__setattr__(self, name, value)
@@ -135,9 +135,9 @@ class FrequencyResponse:
         """Standard deviation of the relative error of the magnitude, and of the phase [rad], shape (F, n)."""
         return np.sqrt(self.variance / 2) / np.abs(self.response)
 
-    def only(self, kept: ArrayLike) -> FrequencyResponse:
+    def only(self, rows: ArrayLike) -> FrequencyResponse:
         """The same at some of the frequencies: a mask or indices."""
-        at = np.asarray(kept)
+        at = np.asarray(rows)
         names = ("omega", "response", "variance", "coherence", "distortion", "drive", "dry", "still", "overtones")
         return replace(self, **{n: getattr(self, n)[at] for n in names})
 
@@ -191,9 +191,9 @@ class FrequencyResponse:
             if not mark.startswith(MARK):
                 raise ValueError(f"it does not begin with '{MARK}'")
             table = np.loadtxt(file, delimiter=",", ndmin=2, comments=None)
-            told = json.loads(about[2:])
+            header = json.loads(about[2:])
             column = dict(zip(names, table.T, strict=True))
-            outputs = tuple(str(y) for y in told["outputs"])
+            outputs = tuple(str(y) for y in header["outputs"])
 
             def both(name: str) -> Complex:
                 return column[f"{name}_re"] + 1j * column[f"{name}_im"]
@@ -206,10 +206,10 @@ class FrequencyResponse:
             return FrequencyResponse(
                 overtones=np.stack(overtones, axis=2) if heard else _none_complex(),
                 omega=column["omega"], response=np.column_stack([both(y) for y in outputs]), outputs=outputs,
-                units=tuple(told["units"]), input=str(told["input"]), variance=each("variance"),
+                units=tuple(header["units"]), input=str(header["input"]), variance=each("variance"),
                 coherence=each("coherence"), distortion=each("distortion"), still=each("still"), drive=both("drive"),
-                dry=np.column_stack([both(f"{y}_dry") for y in outputs]), together=bool(told["together"]),
-                hold=float(told["hold"]), notes=tuple(told["notes"]),
+                dry=np.column_stack([both(f"{y}_dry") for y in outputs]), together=bool(header["together"]),
+                hold=float(header["hold"]), notes=tuple(header["notes"]),
             )  # fmt: skip
         except (OSError, ValueError, KeyError, TypeError, StopIteration, RecursionError) as error:
             if isinstance(error, BadInput):

@@ -3,8 +3,8 @@
 Sines are detected synchronously; of a periodic command whole periods are averaged, and what differs between them is
 noise; anything else is cut into overlapping windows whose cross spectra are averaged (Welch), repeats together.
 
-Of a multisine phases are random, the best of many draws by crest factor. Only odd multiples of the base are asked, so
-that what dry friction and geometry add falls on lines of its own as well as on those asked.
+Of a multisine phases are random, the best of many draws by crest factor. Only odd multiples of the base are excited, so
+that what dry friction and geometry add falls on lines of its own as well as on those excited.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Complex = NDArray[np.complex128]
 SAME = 0.02
 """Relative difference of successive periods of one sine."""
 WEAK = 0.03
-"""Share of the command's largest amplitude spectrum below which a frequency was not asked."""
+"""Share of the command's largest amplitude spectrum below which a frequency was not excited."""
 DRAWS = 200
 """Sets of random phases from which a multisine is chosen."""
 MOST = 80
-"""Frequencies told at most from a sweep."""
+"""Frequencies taken at most from a sweep."""
 
 
 def response_of(
@@ -45,9 +45,9 @@ def response_of(
     records : sequence of Record
         Evenly sampled, but for gaps between sines.
     command, outputs : str and sequence of str
-        Columns, in the units in which the response is told.
+        Columns, in the units of the response.
     kind : {"", "sines", "multisine", "sweep"}
-        How the rig was asked; told from the command when empty.
+        Excitation; recognised from the command when empty.
     hold : float, optional
         Time for which the converter holds a command [s]; one sample when omitted.
     resolution : sequence of float
@@ -66,24 +66,24 @@ def response_of(
     hold = records[0].period if hold is None else hold
     u = records[0][command]
     if not np.ptp(u) > 0:
-        raise NotIdentifiable(f"The command '{command}' never changes, so nothing was asked; name its column.")
+        raise NotIdentifiable(f"The command '{command}' never changes, so nothing was excited; name its column.")
     pieces = [piece for r in records for piece in sines_in(r.t, r[command])] if kind in ("", "sines") else []
     covered = sum(b - a for a, b, _ in pieces) / sum(len(r) for r in records)
     if kind == "sines" or (not kind and covered > 0.5):
-        found = _sines(records, command, outputs, quanta, hold)
-    elif kind == "multisine" or (not kind and len(records) == 1 and repetition(u) is not None):
-        found = multisine_response(records[0], command, outputs, quanta, hold)
+        response = _sines(records, command, outputs, quanta, hold)
+    elif kind == "multisine" or (not kind and all(repetition(r[command]) is not None for r in records)):
+        response = multisine_response(records, command, outputs, quanta, hold)
     else:
-        found = _sweep(records, command, outputs, quanta, hold)
+        response = _sweep(records, command, outputs, quanta, hold)
     if band is not None:
-        kept = (found.omega >= band[0]) & (found.omega <= band[1])
-        if not kept.any():
+        inside = (response.omega >= band[0]) & (response.omega <= band[1])
+        if not inside.any():
             raise NotIdentifiable(
-                f"The log asks {found.omega[0]:.3g} to {found.omega[-1]:.3g} rad/s, nothing between {band[0]:g} and "
-                f"{band[1]:g}."
+                f"The log asks {response.omega[0]:.3g} to {response.omega[-1]:.3g} rad/s, nothing between {band[0]:g} "
+                f"and {band[1]:g}."
             )
-        found = found.only(kept)
-    return found
+        response = response.only(inside)
+    return response
 
 
 def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
@@ -113,7 +113,7 @@ def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
 def _sines(
     records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
 ) -> FrequencyResponse:
-    found: list[tuple[float, Tone, Tone]] = []
+    tones: list[tuple[float, Tone, Tone]] = []
     notes: list[str] = []
     for r in records:
         y = np.column_stack([r[n] for n in outputs])
@@ -129,21 +129,21 @@ def _sines(
                 begin = len(lines) // 2
             first = edges[min(begin, max(0, len(edges) - 3))]
             part = slice(int(first), int(edges[-1]))
-            found.append((
+            tones.append((
                 omega, detect(r.t[part], y[part], omega, resolution=quanta), detect(r.t[part], r[command][part], omega),
             ))  # fmt: skip
-    if not found:
+    if not tones:
         raise NotIdentifiable("The command holds no sine of three periods; try --kind sweep.")
-    found.sort(key=lambda f: f[0])
-    kept = [found[0]]
-    for f in found[1:]:
-        if f[0] > kept[-1][0] * (1 + 1e-4):
-            kept.append(f)
-        elif float(f[1].variance.sum()) < float(kept[-1][1].variance.sum()):
-            kept[-1] = f
+    tones.sort(key=lambda f: f[0])
+    distinct = [tones[0]]
+    for f in tones[1:]:
+        if f[0] > distinct[-1][0] * (1 + 1e-4):
+            distinct.append(f)
+        elif float(f[1].variance.sum()) < float(distinct[-1][1].variance.sum()):
+            distinct[-1] = f
     return from_tones(
-        [x for _, x, _ in kept], [c for _, _, c in kept], outputs=outputs, units=_units(records[0], outputs, command),
-        command=command, hold=hold, notes=notes,
+        [x for _, x, _ in distinct], [c for _, _, c in distinct], outputs=outputs,
+        units=_units(records[0], outputs, command), command=command, hold=hold, notes=notes,
     )  # fmt: skip
 
 
@@ -200,10 +200,10 @@ def _sweep(
     U, Y = np.array(inputs), np.array(answers)
     omega = np.asarray(2 * math.pi * np.fft.rfftfreq(length, records[0].period), dtype=np.float64)
     power = np.sum(np.abs(U) ** 2, axis=0)
-    asked = (np.sqrt(power) > WEAK * np.sqrt(power.max())) & (omega > 1.5 * omega[1])
-    if U.shape[0] < 3 or asked.sum() < 3:
+    excited = (np.sqrt(power) > WEAK * np.sqrt(power.max())) & (omega > 1.5 * omega[1])
+    if U.shape[0] < 3 or excited.sum() < 3:
         raise NotIdentifiable(
-            f"A sweep needs three windows or repeats and three frequencies, got {U.shape[0]} and {int(asked.sum())}; "
+            f"A sweep needs three windows or repeats and three frequencies, got {U.shape[0]} and {int(excited.sum())}; "
             "give the repeats together, or a longer log."
         )
     cross = np.sum(Y * np.conj(U)[:, :, None], axis=0)
@@ -216,7 +216,7 @@ def _sweep(
     G = cross / np.maximum(power[:, None], 1e-300)
     unexplained = np.clip(1 - coherence, 0, None) / np.maximum(coherence, 1e-12)
     variance = np.abs(G) ** 2 * unexplained / np.maximum(count - 1, 0.5)[:, None]
-    at = _thinned(np.flatnonzero(asked), omega)
+    at = _thinned(np.flatnonzero(excited), omega)
     drive = np.array([levels[int(np.argmax(np.abs(U[:, k])))] for k in at])
     variance = variance[at] + quanta**2 / 3 / length / drive[:, None] ** 2
     return FrequencyResponse(
@@ -287,46 +287,78 @@ def repetition(u: Array) -> int | None:
 
 
 def multisine_response(
-    record: Record, command: str, outputs: Sequence[str], quanta: Array, hold: float
+    records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
 ) -> FrequencyResponse:
-    """Response at the lines of a command that repeats.
+    """Response at the lines of a command that repeats, over the periods of all logs.
 
     Raises
     ------
     NotIdentifiable
-        When it does not repeat often enough.
+        When it does not repeat often enough, or the logs hold different commands.
     """
-    u = record[command]
-    length = repetition(u)
-    if length is None or u.size < 3 * length:
-        raise NotIdentifiable("A multisine needs a command that repeats three times at least; try --kind sweep.")
-    periods = u.size // length
-    y = np.column_stack([record[n] for n in outputs])
-    tail = slice(u.size - periods * length, None)
-    Y = np.fft.rfft(_level(y[tail].reshape(periods, length, -1)), axis=1) * 2 / length
-    U = np.fft.rfft(u[tail].reshape(periods, length), axis=1) * 2 / length
-    size = np.abs(U.mean(axis=0))
-    lines = np.flatnonzero(size > 1e-2 * size[1:].max())
-    lines = lines[lines > 0]
-    begin = settled(Y[:, lines].reshape(periods, -1), tolerance=0.01, window=3)
-    notes = () if begin is not None else ("The transient had not died away at the end.",)
-    begin = min(begin if begin is not None else periods // 2, periods - 2)
-    Y, U = Y[begin:], U[begin:]
+    first, period = records[0], records[0].period
+    each = [_periods(record, command, outputs) for record in records]
+    u, length = each[0][1].mean(axis=0), each[0][1].shape[1]
+    notes: list[str] = []
+    heard: list[Complex] = []
+    driven: list[Complex] = []
+    for record, (y, v) in zip(records, each, strict=True):
+        if v.shape[1] != length or abs(record.period / period - 1) > 1e-6:
+            raise NotIdentifiable(
+                f"The logs of a multisine need one period, and hold {length * period:.4g} and "
+                f"{v.shape[1] * record.period:.4g} s; give those of another period by themselves."
+            )
+        # a log may begin anywhere in the period
+        match = np.fft.irfft(np.fft.rfft(u) * np.conj(np.fft.rfft(v.mean(axis=0))), length)
+        y, v = (np.roll(x, int(np.argmax(match)), axis=1) for x in (y, v))
+        Y, U = (np.fft.rfft(x, axis=1) * 2 / length for x in (y, v))
+        lines = _lines(U)
+        begin = settled(Y[:, lines].reshape(len(Y), -1), tolerance=0.01, window=3)
+        if begin is None:
+            notes.append("The transient had not died away at the end.")
+        begin = min(begin if begin is not None else len(Y) // 2, len(Y) - 2)
+        heard.append(Y[begin:])
+        driven.append(U[begin:])
+    Y, U = np.concatenate(heard), np.concatenate(driven)
+    lines = _lines(U)
     count = Y.shape[0]
     mean, drive = Y.mean(axis=0), U.mean(axis=0)[lines]
     scatter = np.sum(np.abs(Y[:, lines] - mean[lines]) ** 2, axis=0) / max(count - 1, 1)
     rounding = 4 * quanta**2 / 12 / length
     cross = np.abs(np.sum(Y[:, lines] * np.conj(U[:, lines, None]), axis=0)) ** 2
     both = np.sum(np.abs(Y[:, lines]) ** 2, axis=0) * np.sum(np.abs(U[:, lines]) ** 2, axis=0)[:, None]
-    omega = np.asarray(2 * math.pi * lines / (length * record.period), dtype=np.float64)
-    dry, still = _friction(mean, lines, length, record.period)
+    omega = np.asarray(2 * math.pi * lines / (length * period), dtype=np.float64)
+    dry, still = _friction(mean, lines, length, period)
     return FrequencyResponse(
         omega=omega, response=mean[lines] / drive[:, None], outputs=tuple(outputs),
-        units=_units(record, outputs, command), input=command,
+        units=_units(first, outputs, command), input=command,
         variance=np.maximum(scatter / count, rounding) / np.abs(drive[:, None]) ** 2,
         coherence=cross / np.maximum(both, 1e-300), distortion=_between(mean, lines), drive=drive, dry=dry, still=still,
-        together=True, hold=hold, notes=(*notes, f"{count} periods of {length * record.period:.3g} s averaged."),
+        together=True, hold=hold,
+        notes=(*dict.fromkeys(notes), f"{count} periods of {length * period:.3g} s averaged."),
     )  # fmt: skip
+
+
+def _lines(U: Complex) -> NDArray[np.int64]:
+    """Those at which a command asks."""
+    size = np.abs(U.mean(axis=0))
+    size[0] = 0.0
+    return np.flatnonzero(size > 1e-2 * size.max())
+
+
+def _periods(record: Record, command: str, outputs: Sequence[str]) -> tuple[Array, Array]:
+    """Whole periods of outputs, without their drift, and of the command: (periods, samples, n) and (periods, samples).
+
+    The last samples of the log are the last of a period.
+    """
+    u = record[command]
+    length = repetition(u)
+    if length is None or u.size < 3 * length:
+        raise NotIdentifiable("A multisine needs a command that repeats three times at least; try --kind sweep.")
+    periods = u.size // length
+    tail = slice(u.size - periods * length, None)
+    y = np.column_stack([record[n] for n in outputs])[tail].reshape(periods, length, -1)
+    return _level(y), u[tail].reshape(periods, length)
 
 
 def _level(y: Array) -> Array:
@@ -338,9 +370,9 @@ def _level(y: Array) -> Array:
 
 
 def _between(mean: Complex, lines: NDArray[np.int64]) -> Array:
-    """What stands on odd lines not asked, as root of its power near each line over the line's own size.
+    """What stands on odd lines not excited, as root of its power near each line over the line's own size.
 
-    Dry friction and geometry are odd: as much of them stands on the lines that were asked.
+    Dry friction and geometry are odd: as much of them stands on the lines that were excited.
     """
     others = np.arange(mean.shape[0]) % 2 == 1
     others[lines] = False

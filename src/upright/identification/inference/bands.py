@@ -6,7 +6,7 @@ the run tells of its own first state taken off, beside what the fit leaves over 
 residuals' memory and by how far they move when one block of the runs is left out (a jackknife in Gauss-Newton steps).
 Both matrices keep a combination that is seen well as sure as it is, which intervals widened one by one do not.
 
-How many such widths are needed is asked of data that a fit did not see (conformal prediction: Vovk, Gammerman and
+How many such widths are needed is calibrated on data that a fit did not use (conformal prediction: Vovk, Gammerman and
 Shafer 2005): each block is predicted from the fit of the others, and the quantile is that of what is missed, in widths.
 Whole blocks, since neighbouring samples err together (Chernozhukov, Wuethrich and Zhu 2018). Blocks lie between others
 of the same motion, and a new run does not, so no quantile is less than that of normal errors. How often bands hold runs
@@ -165,7 +165,7 @@ class _Block:
 
 def _blocks(best: Optimum) -> list[_Block]:
     problem, free = best.problem, ~best.pinned
-    found: list[_Block] = []
+    blocks: list[_Block] = []
     for index, track in enumerate(problem.tracks):
         rows = problem.rows(index, best.x, central=True)
         if rows is None:
@@ -178,8 +178,8 @@ def _blocks(best: Optimum) -> list[_Block]:
             without[np.ix_(sought, sought)] -= (1 - DAMPED) * (J.T @ J)
             g[sought] = J.T @ rows[0][cut].reshape(-1)
             step[free] = pseudo_inverse(without[np.ix_(free, free)]) @ g[free]
-            found.append(_Block(run=index, number=number, count=count, step=step))
-    return found if len(found) > 1 else []
+            blocks.append(_Block(run=index, number=number, count=count, step=step))
+    return blocks if len(blocks) > 1 else []
 
 
 def _missed(problem: Problem, met: Sensitivity, block: _Block, covariance: Array, x: Array, bands: Bands) -> Array:
@@ -218,11 +218,11 @@ def adapted(problem: Problem, index: int, slope: Array, x: Array) -> Array:
     if not own.size:
         return slope
     upto = len(slope) if not track.run.score_from else max(own.size, round(track.run.score_from / track.dt))
-    seen = np.einsum("ab,tbp->tap", track.weighting, slope[:upto])
-    A = seen[..., own].reshape(-1, own.size)
+    weighted = np.einsum("ab,tbp->tap", track.weighting, slope[:upto])
+    A = weighted[..., own].reshape(-1, own.size)
     _, prior = problem.prior_rows(x)
     P = prior[:, problem.sought_in(index)[own]]
-    follow = pseudo_inverse(A.T @ A + P.T @ P) @ (A.T @ seen.reshape(-1, slope.shape[-1]))
+    follow = pseudo_inverse(A.T @ A + P.T @ P) @ (A.T @ weighted.reshape(-1, slope.shape[-1]))
     follow[:, own] = np.eye(own.size)  # so that their own slopes become zero
     return slope - slope[..., own] @ follow
 
@@ -235,12 +235,12 @@ def _variance(slope: Array, covariance: Array) -> Array:
 def _width(track: Track, bands: Bands, age: Array, variance: Array) -> dict[str, Array]:
     """Root of what is left over and what the numbers' uncertainty adds, (N,) by signal."""
     horizon = next(iter(track.run.horizons), None)
-    found: dict[str, Array] = {}
+    widths: dict[str, Array] = {}
     for k, c in _signals(track):
         spread = bands.spread(c, horizon)
         if spread is not None:
-            found[c] = np.sqrt(spread.at(age) ** 2 + variance[:, k])
-    return found
+            widths[c] = np.sqrt(spread.at(age) ** 2 + variance[:, k])
+    return widths
 
 
 def _spreads(tracks: Sequence[Track], met: Sequence[Sensitivity]) -> dict[str, tuple[Spread, ...]]:
@@ -251,12 +251,12 @@ def _spreads(tracks: Sequence[Track], met: Sequence[Sensitivity]) -> dict[str, t
         for k, c in _signals(track):
             least = max(ROUNDING * track.run.quanta[k], LEAST * float(np.std(track.run.y[:, k])))
             kinds.setdefault((c, horizon), []).append((run.error[:, k], run.age, least))
-    found: dict[str, tuple[Spread, ...]] = {}
+    spreads: dict[str, tuple[Spread, ...]] = {}
     for (c, horizon), parts in kinds.items():
         error, age = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
         least = min(part[2] for part in parts)
-        found[c] = (*found.get(c, ()), _spread(error**2, age, horizon, least**2))
-    return found
+        spreads[c] = (*spreads.get(c, ()), _spread(error**2, age, horizon, least**2))
+    return spreads
 
 
 def _spread(squares: Array, age: Array, horizon: float, least: float) -> Spread:
@@ -297,7 +297,7 @@ def banded(
     if run.filtered:  # what disturbs a plant between two samples counts, not its numbers
         names = []
     uncertain = {n: replace(rig.parameters[n], estimate=True) for n in names}
-    problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, given=groups)
+    problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, stated=groups)
     if run.filtered and plain.horizon is not None:
         problem = problem.ahead(plain.horizon)
     track, x = problem.tracks[0], problem.place(own)
@@ -312,10 +312,10 @@ def banded(
             places = [bands.names.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
                       for i in problem.sought_in(0)]  # fmt: skip
             shared = np.flatnonzero(np.array(places) >= 0)
-            kept = np.array(places)[shared]
+            rows = np.array(places)[shared]
             value = problem.value(x)
             natural = np.array([1 / value[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
-            C = bands.covariance[np.ix_(kept, kept)]
+            C = bands.covariance[np.ix_(rows, rows)]
             variance = _variance((slope * natural)[..., shared], C)
     width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
     return replace(

@@ -2,7 +2,7 @@
 
 ``y[k] = c + sum_i A_i y[k - i] + B_i w[k - i]`` (ARX) with `w` the means over each step of the commands and of
 held coordinates. It is fitted by least squares one step ahead; of several orders that one is taken which
-predicts the fitted runs best over the horizon asked. A model with physics that cannot beat it has missed something.
+predicts the fitted runs best over the requested horizon. A model with physics that cannot beat it has missed something.
 """
 
 from __future__ import annotations
@@ -51,19 +51,19 @@ def black_box(fitted: Sequence[Run], run: Run, period: float) -> dict[str, float
     target = min(period, horizon or period) / STEPS
     stride = max(1, round(target / run.period))
     step = stride * run.period
-    seen = [s for other in fitted if _alike(other, run) and (s := _sampled(other, step))]
-    asked = _sampled(run, step)
+    paced = [s for other in fitted if _alike(other, run) and (s := _sampled(other, step))]
+    predicted = _sampled(run, step)
     ahead = None if horizon is None else max(1, round(horizon / step))
     best: tuple[float, dict[int, float]] | None = None
     for order in ORDERS:
-        long = [s for s in seen if len(s.y) > 4 * order * s.stride]
-        if not long or asked is None or len(asked.y) <= 2 * order * stride:
+        long = [s for s in paced if len(s.y) > 4 * order * s.stride]
+        if not long or predicted is None or len(predicted.y) <= 2 * order * stride:
             continue
         weights = _fit(long, order)
         within = float(np.mean([[*_percents(weights, order, s, ahead).values()] for s in long]))
         if best is None or within > best[0]:
             skip = run.score_from / run.period
-            best = within, _percents(weights, order, asked, ahead, skip, exactly=run.filtered)
+            best = within, _percents(weights, order, predicted, ahead, skip, exactly=run.filtered)
     names = [run.measured[k] for k in run.free]
     return {} if best is None else {names[k]: p for k, p in best[1].items()}
 
@@ -93,12 +93,12 @@ def _past(s: Paced, at: NDArray[np.int64], order: int, y: Array) -> Array:
     return np.hstack([np.ones((len(at), 1)), *y, *w])
 
 
-def _fit(seen: Sequence[Paced], order: int) -> Array:
+def _fit(paced: Sequence[Paced], order: int) -> Array:
     rows: list[Array] = []
     after: list[Array] = []
-    for s in seen:
+    for s in paced:
         first, last = (order - 1) * s.stride, len(s.y) - s.stride
-        at = np.arange(first, last, max(1, (last - first) * len(seen) // ROWS))
+        at = np.arange(first, last, max(1, (last - first) * len(paced) // ROWS))
         rows.append(_past(s, at, order, np.array([s.y[at - i * s.stride] for i in range(order)])))
         after.append(s.y[at + s.stride])
     return np.asarray(np.linalg.lstsq(np.vstack(rows), np.vstack(after), rcond=None)[0], dtype=np.float64)

@@ -10,8 +10,8 @@ one Gauss-Newton step). What the estimates then scatter beyond the sandwich is a
 random effects (DerSimonian and Laird 1986), and the truth counts as one more block: on rigs with physics that their
 models lack 93 % of the 95 % intervals held the truth, 83 % without (`python -m benchmarks misfit`).
 
-Combinations of numbers that change no output are told with the one number that would fix each: a free swing without a
-known force or inertia sees only ratios, since masses, forces and frictions scale together.
+Combinations of numbers that change no output are reported with the one number that would fix each: a free swing without
+a known force or inertia sees only ratios, since masses, forces and frictions scale together.
 """
 
 from __future__ import annotations
@@ -174,21 +174,25 @@ def cuts(J: Array, pieces: int) -> NDArray[np.int64]:
     and then stands, pieces that tell equally much.
     """
     length = np.sqrt(np.sum(J * J, axis=(0, 1)))
-    told = np.cumsum(np.sum((J / np.where(length > 0, length, np.inf)) ** 2, axis=(1, 2)))
+    information = np.cumsum(np.sum((J / np.where(length > 0, length, np.inf)) ** 2, axis=(1, 2)))
     inside = np.arange(1, pieces)
     even = inside * len(J) // pieces
-    each = np.diff(told[even - 1], prepend=0.0, append=told[-1])
-    return even if each.max() <= MOST * told[-1] else np.searchsorted(told, inside / pieces * told[-1], side="right")
+    each = np.diff(information[even - 1], prepend=0.0, append=information[-1])
+    return (
+        even
+        if each.max() <= MOST * information[-1]
+        else np.searchsorted(information, inside / pieces * information[-1], side="right")
+    )
 
 
 def _parts(r: Array, J: Array, pieces: int, sought: NDArray[np.int64], size: int) -> list[tuple[Array, Array]]:
     """Gradient (size,) and Gauss-Newton matrix (size, size) of each of so many pieces of a run's rows."""
-    found: list[tuple[Array, Array]] = []
+    parts: list[tuple[Array, Array]] = []
     for rows in np.split(np.arange(len(r)), cuts(J, pieces)):
         flat, g, A = J[rows].reshape(-1, sought.size), np.zeros(size), np.zeros((size, size))
         g[sought], A[np.ix_(sought, sought)] = flat.T @ r[rows].reshape(-1), flat.T @ flat
-        found.append((g, A))
-    return found
+        parts.append((g, A))
+    return parts
 
 
 def between_blocks(
@@ -270,12 +274,12 @@ class Identifiability:
 
     def sentences(self, units: Mapping[str, str]) -> tuple[str, ...]:
         """Say which combinations cannot be seen and which one number would fix it."""
-        said: list[str] = []
+        lines: list[str] = []
         for d in self.blind:
             share = self.parts(d)
             names = [n for n, _ in share]
             if len(names) == 1:
-                said.append(
+                lines.append(
                     f"The data cannot see {names[0]}: no measured output changes with it. "
                     "Give its value, or add a run in which it matters."
                 )
@@ -289,8 +293,8 @@ class Identifiability:
                 terms = ", ".join(f"{n} by {100 * s:+.0f} %" for n, s in share)
                 what = f"The data cannot see a common change of {terms}: the outputs stay the same."
             one = f"Give {fix[0]}" + (f", or any other one of them ({_list(fix[1:], 'or')})," if len(fix) > 1 else "")
-            said.append(f"{what} {one} as a known value to fix it.")
-        return tuple(said)
+            lines.append(f"{what} {one} as a known value to fix it.")
+        return tuple(lines)
 
 
 def identifiability(best: Optimum) -> Identifiability:
@@ -326,7 +330,7 @@ def _null(S: Array) -> list[Array]:
     """Directions of a scaled matrix that change nothing, judged after its columns are brought to one length."""
     d = np.sqrt(np.maximum(np.diag(S), 0.0))
     dead = d <= NULL * d.max(initial=0.0)
-    found = [np.eye(d.size)[i] for i in np.flatnonzero(dead)]
+    directions = [np.eye(d.size)[i] for i in np.flatnonzero(dead)]
     live = np.flatnonzero(~dead)
     if live.size:
         s = 1 / d[live]
@@ -334,8 +338,8 @@ def _null(S: Array) -> list[Array]:
         for k in np.flatnonzero(w <= NULL**2 * w[-1]):
             direction = np.zeros(d.size)
             direction[live] = V[:, k] * s
-            found.append(direction / np.linalg.norm(direction))
-    return found
+            directions.append(direction / np.linalg.norm(direction))
+    return directions
 
 
 def _list(names: list[str], word: str = "and") -> str:

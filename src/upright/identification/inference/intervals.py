@@ -36,6 +36,9 @@ and the refits beside the estimate stall, as on the staircase that what sticks m
 AFFORDED = 2.0e7
 """Residuals that the profiles of one fit may cost altogether."""
 
+WIDE = 0.5
+"""How far an interval may reach from a number that is well determined, relative to it."""
+
 ALREADY = 0.9
 """A number is unseen when the data narrow what was known beforehand to no less than this share of it."""
 
@@ -47,26 +50,27 @@ def shared_estimates(
 
     Without `profiles` every interval comes from a standard error, which takes no time.
     """
-    found: dict[str, Estimate] = {}
+    estimates: dict[str, Estimate] = {}
     budget = AFFORDED if profiles else 0.0
     for i in best.shared:
         u, plain = best.problem.unknowns[i], beside_bound(best, i)
-        if u.name in hidden or (u.asked and not best.pinned[i] and plain.zero_wide):
-            found[u.name] = _unseen(plain)
+        if u.name in hidden or (u.estimated and not best.pinned[i] and plain.zero_wide):
+            estimates[u.name] = replace(plain, status="nuisance") if u.name.startswith(NOISE) else _unseen(plain)
             continue
-        firm = "weak" if best.explains_nothing else "firm"
-        status = firm if u.asked else "known"
+        firm = "poorly determined" if best.explains_nothing else "well determined"
+        status = firm if u.estimated else "known"
         interval = plain.interval
-        wide = interval[1] - interval[0] > abs(plain.value)
+        wide = plain.half > WIDE
         near = best.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
-        if u.asked and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
+        if u.estimated and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
             if profile_work(best) < budget:
                 budget -= profile_work(best)
                 interval = profile(best, i, plain, best.quantile, log)
-                wide = interval[1] - interval[0] > abs(plain.value)
-            status = "at bound" if best.pinned[i] else "weak" if wide else firm
-        found[u.name] = replace(plain, interval=_within(u, interval), status=status)
-    return found
+                wide = replace(plain, interval=interval).half > WIDE
+            status = "at bound" if best.pinned[i] else "poorly determined" if wide else firm
+        status = "nuisance" if u.name.startswith(NOISE) else status
+        estimates[u.name] = replace(plain, interval=_within(u, interval), status=status)
+    return estimates
 
 
 def run_estimates(best: Optimum) -> tuple[dict[str, dict[str, Estimate]], dict[str, dict[str, Estimate]]]:
@@ -79,7 +83,9 @@ def run_estimates(best: Optimum) -> tuple[dict[str, dict[str, Estimate]], dict[s
             continue
         e = estimate(best, i)
         size = abs(e.value) if u.log else u.scale
-        status = "weak" if best.explains_nothing or e.interval[1] - e.interval[0] > size else "firm"
+        status = (
+            "poorly determined" if best.explains_nothing or e.interval[1] - e.interval[0] > size else "well determined"
+        )
         narrowed = not u.log or u.prior is None or float(best.sigma[i]) <= ALREADY * u.prior[1]
         if best.pinned[i]:
             status = "at bound"
@@ -214,12 +220,12 @@ def _end(
         at = float(np.clip(x[place] + reached, problem.lower[place], problem.upper[place]))
         lower[place] = upper[place] = at
         start = np.where(np.arange(x.size) == place, at, z)
-        found = descend(problem.normal, start, lower, upper, tolerance=1e-3, limit=6, report=tell)
-        if found.interrupted:
+        end = descend(problem.normal, start, lower, upper, tolerance=1e-3, limit=6, report=tell)
+        if end.interrupted:
             raise KeyboardInterrupt
-        z = found.x
-        log.met(problem, found, best)
-        height = math.sqrt(max(found.normal.cost - best, 0.0) / rise)
+        z = end.x
+        log.met(problem, end, best)
+        height = math.sqrt(max(end.normal.cost - best, 0.0) / rise)
         if abs(height - 1) < 0.05 or (at == bound and height < 1):
             return at
         if height < 1:
@@ -234,13 +240,13 @@ def _end(
 
 
 def with_model_uncertainty(
-    estimates: Mapping[str, Estimate], best: Optimum, asked: GreyBox, left_out: Sequence[str], log: SearchLog
+    estimates: Mapping[str, Estimate], best: Optimum, requested: GreyBox, left_out: Sequence[str], log: SearchLog
 ) -> dict[str, Estimate]:
     """Estimates whose intervals hold what a term at its bound, or one left out, would make of them."""
     out = dict(estimates)
     others = [beyond_bounds(best, estimates)]
     if left_out:
-        others.append(with_left_out(best, asked, left_out, log))
+        others.append(with_left_out(best, requested, left_out, log))
     for intervals in others:
         for name, interval in intervals.items():
             if name in out and out[name].status not in ("unseen", "known"):
@@ -254,9 +260,9 @@ def beyond_bounds(best: Optimum, estimates: Mapping[str, Estimate]) -> Intervals
     The others move by ``-A_ff^-1 A_fp`` per unit of a pinned number, A the Gauss-Newton matrix.
     """
     unknowns, value, A = best.problem.unknowns, best.values, best.matrix
-    found = {unknowns[i].name: estimates[unknowns[i].name].interval for i in best.shared
+    intervals = {unknowns[i].name: estimates[unknowns[i].name].interval for i in best.shared
              if unknowns[i].name in estimates}  # fmt: skip
-    pinned = [i for i in best.shared if best.pinned[i] and unknowns[i].name in found]
+    pinned = [i for i in best.shared if best.pinned[i] and unknowns[i].name in intervals]
     free = np.flatnonzero(~best.pinned)
     if not pinned or not free.size:
         return {}
@@ -270,32 +276,32 @@ def beyond_bounds(best: Optimum, estimates: Mapping[str, Estimate]) -> Intervals
         move = -(inverse @ A[free, p]) * (u.coordinate(far) - best.x[p] if not u.log or far > 0 else 0.0)
         for i, d in zip(free, move, strict=True):
             other = unknowns[i]
-            if not other.shared or other.name not in found:
+            if not other.shared or other.name not in intervals:
                 continue
             there = float(value[i] * math.exp(np.clip(d, -700, 700)) if other.log else value[i] + d)
             there = min(max(there, other.lower), other.upper)
-            a, b = found[other.name]
-            found[other.name] = (min(a, there), max(b, there))
-    return found
+            a, b = intervals[other.name]
+            intervals[other.name] = (min(a, there), max(b, there))
+    return intervals
 
 
-def with_left_out(best: Optimum, asked: GreyBox, left_out: Sequence[str], log: SearchLog) -> Intervals:
+def with_left_out(best: Optimum, requested: GreyBox, left_out: Sequence[str], log: SearchLog) -> Intervals:
     """Intervals of all shared numbers in the model that also has what was left out, by name; empty when it will not do.
 
     Starts from where the chosen model ended, with a tenth of the guess of each term left out.
     """
     chosen = best.problem
-    parameters = {**chosen.rig.parameters, **{n: asked.parameters[n] for n in left_out}}
+    parameters = {**chosen.rig.parameters, **{n: requested.parameters[n] for n in left_out}}
     richer = formulate(replace(chosen.rig, parameters=parameters), [t.run for t in chosen.tracks])
     richer.weigh_like(chosen)
-    start = richer.place(chosen.values_at(best.x) | {n: 0.1 * asked.parameters[n].value for n in left_out})
+    start = richer.place(chosen.values_at(best.x) | {n: 0.1 * requested.parameters[n].value for n in left_out})
     richer.settle_steps(start)
-    found = descend(richer.normal, start, richer.lower, richer.upper, tolerance=1e-5, limit=25)
-    if found.interrupted:
+    end = descend(richer.normal, start, richer.lower, richer.upper, tolerance=1e-5, limit=25)
+    if end.interrupted:
         raise KeyboardInterrupt
-    if not math.isfinite(found.normal.cost):
+    if not math.isfinite(end.normal.cost):
         return {}
-    there = assess(richer, found.x)
+    there = assess(richer, end.x)
     if there.lost:
         return {}
     quantile = student(best.samples - best.x.size - len(left_out))
@@ -311,7 +317,7 @@ def with_left_out(best: Optimum, asked: GreyBox, left_out: Sequence[str], log: S
 
 
 def widened(e: Estimate, interval: tuple[float, float]) -> Estimate:
-    """An estimate whose interval holds another one too; weak when it is then wider than the value."""
-    low, high = min(e.interval[0], interval[0]), max(e.interval[1], interval[1])
-    wide = e.status == "firm" and high - low > abs(e.value)
-    return replace(e, interval=(low, high), status="weak" if wide else e.status)
+    """An estimate whose interval holds another one too; poorly determined when it then reaches too far."""
+    whole = replace(e, interval=(min(e.interval[0], interval[0]), max(e.interval[1], interval[1])))
+    wide = e.status == "well determined" and whole.half > WIDE
+    return replace(whole, status="poorly determined" if wide else e.status)

@@ -1,4 +1,4 @@
-"""Does a drive act later than its command says? What a dead time that nobody asked for would explain."""
+"""Does a drive act later than its command says? What a dead time outside the model would explain."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ class Lateness:
 
 
 def lateness(best: Optimum) -> Lateness | None:
-    """The dead time that nobody asked for.
+    """A dead time outside the model.
 
-    None where the drive's dead time or lag is asked or known already, or nothing is driven.
+    None where the drive's dead time or lag is estimated or known already, or nothing is driven.
     """
     problem, x = best.problem, best.x
     rig = problem.rig
     stated = any(p.estimate or p.value for n, p in rig.parameters.items() if n in (DELAY, LAG))
     if stated or not any(np.any(track.u) or track.run.loop is not None for track in problem.tracks):
         return None
-    asked = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
-    (late,) = shared_unknowns(replace(rig, parameters={DELAY: asked}))
+    delay_parameter = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
+    (late,) = shared_unknowns(replace(rig, parameters={DELAY: delay_parameter}))
     wider = replace(problem, unknowns=[*problem.unknowns, late], steps=np.append(problem.steps, 1e-6))
     z = np.append(x, 0.0)
     here = wider.settle_steps(z)
@@ -61,13 +61,13 @@ def lateness(best: Optimum) -> Lateness | None:
     if slope >= 0 or not slope**2 > PROMISED * here.cost * curvature:
         return None
     z[-1] = min(-slope / curvature, NEAR)
-    found = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-6, limit=FITTED)
-    if found.normal.cost > MENDED**2 * here.cost:
+    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-6, limit=FITTED)
+    if end.normal.cost > MENDED**2 * here.cost:
         return None
-    told = assess(wider, found.x)
-    if told.lost:
+    assessed = assess(wider, end.x)
+    if assessed.lost:
         return None
-    delay, error = found.x[-1], told.quantile * told.sigma[-1]
+    delay, error = end.x[-1], assessed.quantile * assessed.sigma[-1]
     if not 0 < error < delay:
         return None
     before, after = (
@@ -76,12 +76,14 @@ def lateness(best: Optimum) -> Lateness | None:
             for i, track in enumerate(of.tracks)
             for s, p in score_run(of, i, at).fit_percent.items()
         }
-        for of, at in ((problem, x), (wider, found.x))
+        for of, at in ((problem, x), (wider, end.x))
     )
     run, signal = worst = min(before, key=lambda key: before[key])
     half = best.quantile * best.sigma
     bent = tuple(
-        u.name for i, u in enumerate(problem.unknowns) if u.shared and u.asked and abs(found.x[i] - x[i]) > half[i] > 0
+        u.name
+        for i, u in enumerate(problem.unknowns)
+        if u.shared and u.estimated and abs(end.x[i] - x[i]) > half[i] > 0
     )
     cost = f", and moves {', '.join(bent)} out of what the intervals say" if bent else ""
     ms = [f"{1e3 * value:.3g}" for value in (delay, delay - error, delay + error)]

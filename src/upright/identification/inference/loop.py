@@ -45,8 +45,8 @@ def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
     if len(rig.plant.inputs) != 1:
         return None
     values, names, C = shared_values(best)
-    found = poles(rig, values, names, C, best.quantile)
-    growing = {at: max((p.real for p in told), key=lambda e: e.value) for at, told in found.items()}
+    by_equilibrium = poles(rig, values, names, C, best.quantile)
+    growing = {at: max((p.real for p in there), key=lambda e: e.value) for at, there in by_equilibrium.items()}
     at = max(growing, key=lambda a: growing[a].value, default="")
     if not at or growing[at].value <= 0 or growing[at].interval[0] == growing[at].interval[1] == 0:
         return None
@@ -90,7 +90,7 @@ def placed(A: Array, b: Array, wanted: Array) -> Array | None:
     reach = np.stack([np.linalg.matrix_power(A, k) @ b for k in range(len(A))], axis=1)
     if np.linalg.cond(reach) > 1e10:
         return None
-    p = reduce(lambda done, pole: done @ (A - pole * np.eye(len(A))), wanted, np.eye(len(A)))
+    p = reduce(lambda product, pole: product @ (A - pole * np.eye(len(A))), wanted, np.eye(len(A)))
     return np.linalg.solve(reach.T, np.eye(len(A))[-1]) @ p
 
 

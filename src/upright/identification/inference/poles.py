@@ -41,7 +41,7 @@ def poles(
     """Poles [1/s] at each equilibrium, the fastest growing first, friction viscous only and back-EMF included.
 
     First-order propagation (delta method) of the covariance of the numbers sought. Of a conjugate pair the one above
-    the real axis is told. Equilibria that the fitted plant does not have are left out.
+    the real axis is reported. Equilibria that the fitted plant does not have are left out.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ def poles(
         Coordinates that did not move freely, for each way in which the rig was run: it swings otherwise then, and the
         equilibrium is called so.
     """
-    found: dict[str, tuple[Pole, ...]] = {}
+    out: dict[str, tuple[Pole, ...]] = {}
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if not np.isfinite(covariance).all():
-        return found
+        return out
     ways = sorted({still & {c.name for c in rig.plant.coordinates} for still in held}, key=sorted)
     for at, still in product(rig.plant.equilibria, ways):
         try:
@@ -77,7 +77,7 @@ def poles(
             np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", part, covariance, part), 0.0))
             for part in (slope.real, slope.imag)
         ]
-        found[f"{at}, {' and '.join(sorted(still))} held" if still else at] = tuple(
+        out[f"{at}, {' and '.join(sorted(still))} held" if still else at] = tuple(
             Pole(
                 real=_of_one_sign(float(p.real), float(a), quantile, "1/s"),
                 imag=_of_one_sign(float(p.imag), float(b), quantile, "rad/s"),
@@ -85,7 +85,7 @@ def poles(
             for p, a, b in zip(here, *errors, strict=True)
             if p.imag >= 0
         )
-    return found
+    return out
 
 
 def _of_one_sign(value: float, stderr: float, quantile: float, unit: str) -> Estimate:
@@ -120,7 +120,7 @@ def _poles(rig: GreyBox, values: Mapping[str, float], at: str, held: frozenset[s
         force = mass @ A[1::2]
         A = A[np.ix_(states, states)]
         A[1::2] = np.linalg.solve(mass[np.ix_(free, free)], force[np.ix_(free, states)])
-    found = np.linalg.eigvals(A).astype(np.complex128)
+    roots = np.linalg.eigvals(A).astype(np.complex128)
     # rounding splits a double pole, as that of a free body, by the root of what it is
-    found.imag[np.abs(found.imag) < SPLIT * np.abs(found).max(initial=0.0)] = 0.0
-    return found[np.lexsort((found.imag, -found.real))]
+    roots.imag[np.abs(roots.imag) < SPLIT * np.abs(roots).max(initial=0.0)] = 0.0
+    return roots[np.lexsort((roots.imag, -roots.real))]

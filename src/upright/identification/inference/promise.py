@@ -18,16 +18,16 @@ that their models lack one signal in eleven had fewer than this (`python -m benc
 
 
 @dataclass(frozen=True, kw_only=True)
-class Kept:
+class PredictionCheck:
     """Whether the promise was kept, and the sentence that says so."""
 
-    kept: bool
+    holds: bool
     sentence: str
 
 
 def promise(
     runs: Mapping[str, RunScore], bands: Bands | None, fitted: Mapping[str, Mapping[str, float]] | None = None
-) -> Kept:
+) -> PredictionCheck:
     """Whether predicted runs are met as well as a fit promises.
 
     Parameters
@@ -45,24 +45,24 @@ def promise(
     bare = [f"{signal} of {label}" for label, s in runs.items() for signal in s.fit_percent if signal not in s.band]
     unfitted = f" No band is promised for {', '.join(bare)}, which no fitted run showed." if bare else ""
     if not inside:
-        return Kept(kept=False, sentence=f"Nothing tells how well this is predicted.{unfitted}")
+        return PredictionCheck(holds=False, sentence=f"Nothing tells how well this is predicted.{unfitted}")
     short = [f"{label} {signal} {p:.0f} %" for (label, signal), p in inside.items() if p < FEWEST]
     level = f"{100 * bands.level:.0f} % bands"
     low, high = min(inside.values()), max(inside.values())
     span = f"{low:.0f} %" if round(low) == round(high) else f"{low:.0f} to {high:.0f} %"
     if short:
-        return Kept(
-            kept=False,
+        return PredictionCheck(
+            holds=False,
             sentence=f"Predicted worse than the fit promises: inside the {level} lie only "
             f"{', '.join(short)} of the samples ({FEWEST:.0f} % is the least).{unfitted}",
         )
-    return Kept(
-        kept=True,
+    return PredictionCheck(
+        holds=True,
         sentence=f"Predicted as well as the fit promises: {span} of the samples lie inside the {level}.{unfitted}",
     )
 
 
-def _as_the_fitted(runs: Mapping[str, RunScore], fitted: Mapping[str, Mapping[str, float]]) -> Kept:
+def _as_the_fitted(runs: Mapping[str, RunScore], fitted: Mapping[str, Mapping[str, float]]) -> PredictionCheck:
     least: dict[str, float] = {}
     for percents in fitted.values():
         for signal, percent in percents.items():
@@ -75,5 +75,7 @@ def _as_the_fitted(runs: Mapping[str, RunScore], fitted: Mapping[str, Mapping[st
     ]
     without = "The fit holds no bands, so none is drawn; identify again to have them."
     if short:
-        return Kept(kept=False, sentence=f"Predicted much worse than the fitted runs ({', '.join(short)}). {without}")
-    return Kept(kept=True, sentence=f"Predicted about as well as the fitted runs. {without}")
+        return PredictionCheck(
+            holds=False, sentence=f"Predicted much worse than the fitted runs ({', '.join(short)}). {without}"
+        )
+    return PredictionCheck(holds=True, sentence=f"Predicted about as well as the fitted runs. {without}")

@@ -42,24 +42,24 @@ def reached(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:
 
 
 def _of(rig: GreyBox, run: Run) -> dict[str, float]:
-    found: dict[str, float] = {}
+    reached: dict[str, float] = {}
     for k, source in enumerate(rig.plant.inputs[: run.u.shape[1]]):
-        found[f"command.{source.name}"] = float(np.abs(run.u[:, k]).max())
+        reached[f"command.{source.name}"] = float(np.abs(run.u[:, k]).max())
     for k, name in enumerate(run.measured):
         y = run.y[:, k]
         width = smoothing_width(y, run.period, dominant_period(y, run.period), run.quanta[k])
         speed = savitzky_golay(y, run.period, width, derivatives=1).v
-        found[f"{name}_dot"] = float(np.percentile(np.abs(speed), SURE))
+        reached[f"{name}_dot"] = float(np.percentile(np.abs(speed), SURE))
         if matters(rig, name):
             round_again = not matters(rig, name, by=2 * math.pi)
-            found[name] = float(np.abs(np.angle(np.exp(1j * y)) if round_again else y).max())
-    return found
+            reached[name] = float(np.abs(np.angle(np.exp(1j * y)) if round_again else y).max())
+    return reached
 
 
 def beyond(rig: GreyBox, run: Run, most: Mapping[str, float]) -> tuple[str, ...]:
     """What of a run lies beyond the largest sizes `most` that were fitted, a sentence each."""
     units = {c.name: c.unit for c in rig.plant.coordinates}
-    said: list[str] = []
+    sentences: list[str] = []
     for name, value in reached(rig, [run]).items():
         fitted = most.get(name)
         if fitted is None or not value > FURTHER * fitted or name == "horizon":
@@ -68,14 +68,14 @@ def beyond(rig: GreyBox, run: Run, most: Mapping[str, float]) -> tuple[str, ...]
         times = (
             f"{value / fitted:.3g} times the {fitted:.3g}{unit} that was fitted" if fitted > 0 else "none was fitted"
         )
-        said.append(f"Run '{run.label}' extrapolates: {what} reaches {value:.3g}{unit}, {times}.")
+        sentences.append(f"Run '{run.label}' extrapolates: {what} reaches {value:.3g}{unit}, {times}.")
     ahead = float(run.t[-1] - run.t[0]) if not run.horizons else max(run.horizons)
     if "horizon" in most and ahead > FURTHER * most["horizon"]:
-        said.append(
+        sentences.append(
             f"Run '{run.label}' extrapolates: it is predicted {ahead:.3g} s ahead, {ahead / most['horizon']:.3g} times "
             f"the {most['horizon']:.3g} s that were fitted."
         )
-    return tuple(said)
+    return tuple(sentences)
 
 
 def _called(rig: GreyBox, name: str, units: Mapping[str, str]) -> tuple[str, str]:

@@ -71,14 +71,14 @@ def score_run(problem: Problem, index: int, x: Array, seconds: float | None = No
 
 
 def _score_ahead(problem: Problem, index: int, x: Array, plan: FilterPlan, seconds: float) -> RunScore:
-    """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart.
+    """Score of a run that a filter predicts: predicted exactly so far ahead, restart by restart.
 
-    Beside it stand the horizons that were asked for, each with what the start state allows.
+    Beside it stand the requested horizons, each with what the start state allows.
     """
-    asked = problem.tracks[index]
-    run, weight = asked.run, plan.weight[:, None, None]
-    y = problem.simulate(index, x[:, None], asked.length)[..., 0] / weight
-    targets = asked.targets(asked.length) / weight
+    requested = problem.tracks[index]
+    run, weight = requested.run, plan.weight[:, None, None]
+    y = problem.simulate(index, x[:, None], requested.length)[..., 0] / weight
+    targets = requested.targets(requested.length) / weight
     percents = {h: _percents(run, targets[i], y[i]) for i, h in enumerate(run.horizons)}
     near = problem.ahead(seconds)
     track = near.tracks[index]
@@ -140,7 +140,7 @@ def predict(
     bands : Bands, optional
         What the fit promises; that of a `Fit` when omitted. Without it no band is drawn.
     progress : callable, optional
-        Told the stage, its cost and its number of simulations, and the share done.
+        Called with the stage, its cost and number of simulations, and the share completed.
 
     Raises
     ------
@@ -223,18 +223,18 @@ def _foresee(
     upto = run.score_from if run.score_from > 0 else math.inf
     if run.score_from > 2 * run.period and (run.horizon is not None or run.t.size >= LEAST_RUN):
         before, upto = before.first_part(run.score_from / (run.period * run.t.size)), math.inf
-    problem = formulate(rig, [before], given=groups)
+    problem = formulate(rig, [before], stated=groups)
     x, log = problem.start, SearchLog(progress=progress)
     if x.size:
-        found = descend_progressively(problem, x, log, upto=upto)
+        end = descend_progressively(problem, x, log, upto=upto)
         for other in _either_side(problem):
-            found = better(found, descend_progressively(problem, other, log, upto=upto))
-        if found.interrupted:
+            end = better(end, descend_progressively(problem, other, log, upto=upto))
+        if end.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh
-            found = settle_weights(problem, found)
-        x = found.x
-    whole = formulate(rig, [run], thin=False, given=groups)
+            end = settle_weights(problem, end)
+        x = end.x
+    whole = formulate(rig, [run], thin=False, stated=groups)
     sought = [u.name for u in problem.unknowns if u.lower < u.upper]
     adapted = dict.fromkeys("initial" if name.startswith("initial.") else name for name in sought)
     return replace(score_run(whole, 0, x, seconds), adapted=tuple(adapted)), problem, x

@@ -1,6 +1,6 @@
 """The verdict in three answers: does the model predict, which of its numbers can be used, and is it enough for a loop?
 
-None is better than its reasons. What was not tested is said to be not tested.
+None is better than its reasons. What was not tested is reported as not tested.
 """
 
 from __future__ import annotations
@@ -9,9 +9,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from upright.identification.inference.assumptions import proportional, resting
+from upright.basis import NOT_SUPPORTED, in_percent
+from upright.identification.inference.assumptions import resting
 from upright.identification.inference.ceiling import ENOUGH, Judged
 from upright.identification.inference.loop import Standing
+from upright.identification.inference.ties import Tie
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.grey_box import GreyBox
 from upright.quantities import figures
@@ -27,6 +29,9 @@ MARGIN = 2.0
 
 VAGUE = 10.0
 """An interval of a positive number whose ends are this many times apart leaves it undetermined."""
+
+VANISHED = 1e-6
+"""Share of its guess below which a mass has vanished: no guess of a rig's is a million times too large."""
 
 ESSENTIAL = ("J_", "m_", "k_", "l_", "actuator.gain")
 """Numbers without which a model is none: inertias, stiffnesses, lengths, the drive; friction is often vague."""
@@ -52,7 +57,7 @@ class Evidence:
     filter predicts, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
-    more than they vary.
+    more than they vary, `ties` which pairs of numbers cannot be told apart.
     """
 
     rig: GreyBox
@@ -71,13 +76,14 @@ class Evidence:
     bent: Sequence[str] = ()
     lost: Sequence[str] = ()
     nothing: bool = False
+    ties: Sequence[Tie] = ()
 
 
-def judge(found: Evidence) -> tuple[Judgement, ...]:
+def judge(evidence: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
-    predicts = _predicts(found)
-    others = _usable(found, confirmed=predicts.answer == "yes"), _loop(found)
-    if found.interrupted:
+    predicts = _predicts(evidence)
+    others = _usable(evidence, confirmed=predicts.answer == "yes"), _loop(evidence, supported=predicts.answer != "no")
+    if evidence.interrupted:
         return predicts, *map(_not_evaluated, others)
     if predicts.answer != "no":
         return predicts, *others
@@ -104,41 +110,41 @@ def trusted(answers: Sequence[Judgement]) -> bool:
     return not any(a.answer == "no" for a in answers if a.question != LOOP)
 
 
-def _predicts(found: Evidence) -> Judgement:
+def _predicts(evidence: Evidence) -> Judgement:
     against: list[str] = []
-    if found.lost:
-        against.append(_failure(found.lost))
-    if found.interrupted:
+    if evidence.lost:
+        against.append(_failure(evidence.lost))
+    if evidence.interrupted:
         against.append("The search was interrupted; this is its best so far.")
-    elif not found.converged and not found.lost:
+    elif not evidence.converged and not evidence.lost:
         against.append("The search had not settled when its evaluations ran out.")
-    fitted, predicted = (_percents(found.runs, role) for role in ("fit", "predict"))
+    fitted, predicted = (_percents(evidence.runs, role) for role in ("fit", "predict"))
     poor = [f"{what} {p:.1f} %" for what, p in fitted.items() if p < GOOD]
     if poor:
         against.append(f"The fitted runs are not explained ({', '.join(poor)}; {GOOD:.0f} % is the least).")
-    worse = _worse(found.runs)
+    worse = _worse(evidence.runs)
     if worse:
         against.append(f"Runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)}).")
     bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD]
     if bad and not worse:
         against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
-    against += [s[0].upper() + s[1:] for s in found.conventions]
-    blank = uninformative(found.runs)
-    explains = f"It explains {_ranges(found.runs, 'fit')} of the fitted runs. " if fitted else ""
-    if blank and len(blank) == sum(len(s.fit_percent) for s in found.runs.values()):
+    against += [s[0].upper() + s[1:] for s in evidence.conventions]
+    blank = uninformative(evidence.runs)
+    explains = f"It explains {_ranges(evidence.runs, 'fit')} of the fitted runs. " if fitted else ""
+    if blank and len(blank) == sum(len(s.fit_percent) for s in evidence.runs.values()):
         against.append("No run is predicted far enough ahead to test the model.")
-    notes: list[str] = [] if found.judged is None else _horizon(found.judged, found.runs)
+    notes: list[str] = [] if evidence.judged is None else _horizon(evidence.judged, evidence.runs)
     if blank:
-        where = ", ".join(f"{label} {signal} at {found.runs[label].horizon:g} s" for label, signal in blank)
+        where = ", ".join(f"{label} {signal} at {evidence.runs[label].horizon:g} s" for label, signal in blank)
         notes.append(
             f"Some horizons tell nothing: holding the measured speed predicts as well to within {MARGIN:.0f} % "
             f"({where}); predict further ahead."
         )
-    if found.memory > 0.05 * found.period and fitted:
+    if evidence.memory > 0.05 * evidence.period and fitted:
         notes.append(
-            f"The residuals are autocorrelated over about {found.memory:.2g} s, so a small effect is unmodelled. The "
-            "intervals include this correlation and the spread between parts of the runs, but not a wrong structure of "
-            "the model."
+            f"The residuals are autocorrelated over about {evidence.memory:.2g} s, so a small effect is unmodelled. "
+            "The intervals include this correlation and the spread between parts of the runs, but not a wrong "
+            "structure of the model."
         )
     if against:
         return Judgement(
@@ -151,8 +157,10 @@ def _predicts(found: Evidence) -> Judgement:
             advice="Hold a run or a tail out (role = \"predict\", or --hold-out).", reasons=tuple(notes),
         )  # fmt: skip
     part = "in part" if blank else "yes"
-    headline = f"{explains}It predicts {_ranges(found.runs, 'predict')} of runs it has not seen{_beside(found.runs)}."
-    beaten = _beaten(found.runs)
+    headline = (
+        f"{explains}It predicts {_ranges(evidence.runs, 'predict')} of runs it has not seen{_beside(evidence.runs)}."
+    )
+    beaten = _beaten(evidence.runs)
     if beaten:
         notes.append(
             f"An equation without physics, fitted to the same runs, predicts better ({', '.join(beaten)}), so the "
@@ -201,29 +209,36 @@ def _failure(lost: Sequence[str]) -> str:
     )
 
 
-def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
-    if found.lost:
+def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
+    if evidence.lost:
         return Judgement(
             question=USABLE, answer="no",
             headline="None of them: the fit failed, and they are only where its search stopped.",
         )  # fmt: skip
-    asked = {n: e for n, e in found.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
-    firm = [n for n, e in asked.items() if e.status == "firm"]
-    reasons: list[str] = list(found.unseen)
-    no = bool(found.unseen)
-    if asked and found.nothing:
+    estimated = {n: e for n, e in evidence.estimates.items() if e.status not in IDLE}
+    sure = [n for n, e in estimated.items() if e.status.startswith(DETERMINED)]
+    reasons: list[str] = list(evidence.unseen)
+    no = bool(evidence.unseen)
+    if estimated and evidence.nothing:
         no = True
         reasons.append(
             "The model misses the fitted runs by more than these vary, so none of its numbers is determined, however "
             "narrow its interval."
         )
-    elif asked and not firm and not found.unseen:
+    elif estimated and not sure and not evidence.unseen:
         no = True
-        reasons.append("No number asked is determined well, so others would explain the runs as well.")
-    for n, e in asked.items():
-        low, high = e.interval
-        limit = found.rig.bounds(n) if n in found.rig.parameters else (-math.inf, math.inf)
-        if e.status == "at bound" and e.value != 0:
+        reasons.append("No estimated number is determined well, so others would explain the runs as well.")
+    for n, e in estimated.items():
+        low, high = e.given or e.interval
+        limit = evidence.rig.bounds(n) if n in evidence.rig.parameters else (-math.inf, math.inf)
+        if _vanished(evidence.rig, n, e):
+            no = True
+            reasons.append(
+                f"{n} went to nothing, {e.value:.1g} {e.unit}, from a guess of {evidence.rig.parameters[n].value:.2g}: "
+                "a degenerate optimum, so the other numbers are not the rig's either. Measure it or the drive's gain "
+                "and give that as known, and look at the drive's sign."
+            )
+        elif e.status == "at bound" and e.value != 0:
             no = True
             reasons.append(
                 f"{n} reached its {'lower' if e.value <= limit[0] else 'upper'} limit, {_shown(e.value, e)}: the data "
@@ -233,54 +248,102 @@ def _usable(found: Evidence, *, confirmed: bool) -> Judgement:
             reasons.append(
                 f"{n} reached its lower limit, 0: these data give no evidence for it (at most {_shown(high, e)})."
             )
-        elif e.status == "weak" and low > 0 and high > VAGUE * low:
+        elif e.status == "poorly determined" and low > 0 and high > VAGUE * low:
             no = no or n.startswith(ESSENTIAL)
             reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
-        elif e.status == "unseen" and not any(n in sentence for sentence in found.unseen):
+        elif e.status == "unseen" and not any(n in sentence for sentence in evidence.unseen):
             no = True
             reasons.append(
                 f"{n} has no interval: its standard error came out as zero, as where a motion depends on it without "
                 "bound. Start nearer to the truth, or fit a shorter window."
             )
-        elif e.status == "weak" and not found.nothing:
+        elif e.status == "poorly determined" and not evidence.nothing:
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
-    for a in found.assumptions:
+    open_ = {n for n, e in estimated.items() if not e.status.startswith("well") and not e.status.startswith("rests")}
+    reasons += [tie.sentence for tie in evidence.ties if {tie.first, tie.second} & open_]
+    for a in evidence.assumptions:
         moved = resting(a)
         if moved:
             verb = "rests" if len(moved) == 1 else "rest"
             reasons.append(f"{', '.join(moved)} {verb} on {a.name} (assumed).")
-    reasons += _lumped(found.rig)
-    guessed = found.rig.guessed and not confirmed
+    reasons += _lumped(evidence.rig)
+    guessed = evidence.rig.guessed and not confirmed
     if guessed:
         reasons.append(
             "That the rig is of this kind was guessed from its columns, and no prediction of a run that was not fitted "
             "confirms it: name the plant, or hold a run out."
         )
-    if found.bent:
+    if evidence.bent:
         reasons.append(
-            f"{', '.join(found.bent)}: outside their intervals once the drive may act late, which explains the runs "
+            f"{', '.join(evidence.bent)}: outside their intervals once the drive may act late, which explains the runs "
             "better; ask for its delay."
         )
-    moving = {n: a for a in found.assumptions for n in resting(a)}
-    free = [n for n in firm if n not in moving and n not in found.bent]
+    moving = {n: a for a in evidence.assumptions for n in resting(a)}
+    free = [n for n in sure if n not in moving and n not in evidence.bent and estimated[n].status == "well determined"]
+    widest = max((estimated[n].half for n in free), default=math.inf)
+    narrow = f" {'Each' if free[1:] else 'It'} is known to {_share(widest)} or better." if widest < 1 else ""
+    known = f"{', '.join(free)}.{narrow}"
+    ratios = _ratios(evidence)
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
-        answer, headline = "in part", "As numbers of a plant that was guessed."
-    elif found.bent and not free:
-        answer, headline = "no", "None of them before the drive's delay is asked for."
+        answer, headline = "in part", f"As numbers of a plant that was guessed.{_and(ratios)}"
+    elif evidence.bent and not free:
+        answer, headline = "no", "None of them before the drive's delay is estimated."
     elif reasons:
-        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}."
+        answer, headline = "in part", f"These numbers can be used: {known}{_and(ratios)}"
         if not free:
-            scaled = {n for a in found.assumptions for n in proportional(a)} >= set(firm)
-            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in firm))
-            headline = "Only their ratios." if scaled or not missing else f"None of them before {missing} is measured."
+            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in sure))
+            headline = f"None of them before {missing} is measured.{_and(ratios)}"
+            if not missing:
+                headline = "None alone, only their sums."
     else:
-        answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was asked."
+        answer, headline = "yes", f"All numbers can be used: {known}" if sure else "Nothing was estimated."
     advice = ""
-    if any(e.status in ("weak", "unseen") for e in asked.values()):
+    if any(e.status in ("poorly determined", "unseen") for e in estimated.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
     return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+
+
+IDLE = ("known", "assumed", "left out", "nuisance")
+"""Statuses of numbers that nobody asked, or that only describe the noise."""
+
+DETERMINED = ("well determined", "rests on", "tied to")
+"""Beginnings of the statuses of numbers that the data determine: alone, per an assumed number, or with another."""
+
+
+def _ratios(found: Evidence) -> dict[str, Estimate]:
+    """What is known per assumed number, of numbers that the data determine."""
+    return {
+        name: e for a in found.assumptions for name, e in a.ratios.items()
+        if e.status.startswith(DETERMINED) and e.half < 1
+    }  # fmt: skip
+
+
+def _and(ratios: Mapping[str, Estimate]) -> str:
+    """A sentence of the ratios that are known, each with its interval."""
+    if not ratios:
+        return ""
+    return f" Known per assumed number: {'; '.join(f'{n} = {_with_interval(e)}' for n, e in ratios.items())}."
+
+
+def _with_interval(e: Estimate) -> str:
+    digits = figures(e.value, e.half * abs(e.value) / 2)
+    value, low, high = (f"{v:.{digits}g}" for v in (e.value, *e.interval))
+    return f"{value} ({low} to {high}) {e.unit}".removesuffix(" 1").rstrip()
+
+
+def _share(half: float) -> str:
+    """Half an interval relative to its value, rounded up to two figures."""
+    percent = 100 * half
+    step = 10.0 ** (math.floor(math.log10(percent)) - 1) if percent > 0 else 1.0
+    return f"{math.ceil(percent / step - 1e-9) * step:.2g} %"
+
+
+def _vanished(rig: GreyBox, name: str, e: Estimate) -> bool:
+    """Whether a mass, inertia, length or gain that cannot be zero was driven there."""
+    guess = rig.parameters[name].value if name in rig.parameters else 0.0
+    return name.startswith(("m_", "J_", "l_", "actuator.gain")) and 0 < abs(e.value) < VANISHED * abs(guess)
 
 
 def _lumped(rig: GreyBox) -> list[str]:
@@ -291,11 +354,11 @@ def _lumped(rig: GreyBox) -> list[str]:
     return []
 
 
-def _loop(found: Evidence) -> Judgement:
-    s = found.standing
-    if found.lost:
+def _loop(evidence: Evidence, *, supported: bool) -> Judgement:
+    s = evidence.standing
+    if evidence.lost:
         return Judgement(question=LOOP, answer="not tested", headline="Not evaluated: the fit failed.")
-    if s is None and found.unseen:
+    if s is None and evidence.unseen:
         return Judgement(
             question=LOOP, answer="not tested",
             headline="Not evaluated: the poles rest on numbers that these data cannot see.",
@@ -308,20 +371,24 @@ def _loop(found: Evidence) -> Judgement:
     grows, digits = s.growth, figures(s.growth.value, s.growth.stderr)
     value, low, high = (f"{v:#.{digits}g}".rstrip(".") for v in (grows.value, *grows.interval))
     where = f"{s.at}, the fastest pole is {value} 1/s ({low} to {high})"
-    if not found.driven:
+    if not evidence.driven:
         return Judgement(
             question=LOOP, answer="not tested",
             headline=f"{where[0].upper()}{where[1:]}; no fitted run was driven, so what the drive does is not known.",
             advice="Add a run in which it acts.",
         )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
-    held = f"a loop whose poles are as fast as that holds {100 * s.share:.0f} % of the rigs within the intervals"
+    held = f"a loop with poles as fast as that stabilises {in_percent(s.share)} of the rigs within the intervals"
+    if not supported:
+        held = (
+            f"how many of the rigs within the intervals a loop with poles as fast as that stabilises is {NOT_SUPPORTED}"
+        )
     answer = "no"
     if half <= NARROW and s.share >= SURE:
         answer = "yes"
     elif half <= SOME and s.share >= LIKELY:
         answer = "in part"
-    doubted = any(not a for a in (found.converged, not found.interrupted))
+    doubted = any(not a for a in (evidence.converged, not evidence.interrupted))
     return Judgement(
         question=LOOP, answer="no" if doubted else answer,
         headline=f"{where[0].upper()}{where[1:]}; {held}.",
@@ -346,15 +413,17 @@ def _percents(runs: Mapping[str, RunScore], role: str) -> dict[str, float]:
 
 def _beside(runs: Mapping[str, RunScore]) -> str:
     """What holding the measured speed and a black box reach of the runs that are predicted."""
-    told: list[str] = []
+    parts: list[str] = []
     for what, reached in (
         ("holding the measured speed", lambda s: s.naive),
         ("an equation without physics", lambda s: s.black_box),
     ):
-        found = {f"{label} {n}": p for label, s in runs.items() if s.role == "predict" for n, p in reached(s).items()}
-        if found:
-            told.append(f"{what}: {_range({n: max(p, 0.0) for n, p in found.items()})}")
-    return f" ({'; '.join(told)})" if told else ""
+        percents = {
+            f"{label} {n}": p for label, s in runs.items() if s.role == "predict" for n, p in reached(s).items()
+        }
+        if percents:
+            parts.append(f"{what}: {_range({n: max(p, 0.0) for n, p in percents.items()})}")
+    return f" ({'; '.join(parts)})" if parts else ""
 
 
 def _beaten(runs: Mapping[str, RunScore]) -> list[str]:

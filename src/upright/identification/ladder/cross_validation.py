@@ -35,8 +35,8 @@ class CrossValidation:
     """Every run as fitted among all, and as predicted by a fit of the others, by its label.
 
     `values` are the parameters of the fit without the run, `blind` those that the others could not see: they keep what
-    the run itself said, so that its prediction is none of theirs. Runs that an interrupted search did not come to are
-    missing but for `fitted`. `bands` are those of the fit of all runs, as wide as these predictions ask.
+    the run itself specified, so that its prediction is none of theirs. Runs that an interrupted search did not come to
+    are missing but for `fitted`. `bands` are those of the fit of all runs, as wide as these predictions ask.
     """
 
     fitted: Mapping[str, RunScore]
@@ -167,15 +167,15 @@ def cross_validate(
         for n, p in fit.model.parameters.items()
     }
     rig = replace(fit.model, parameters=parameters)
-    done = leave_one_out(rig, fitted, fit.keyed(), promise=True, progress=progress, workers=workers)
-    found = done.so_far()
+    spreading = leave_one_out(rig, fitted, fit.keyed(), promise=True, progress=progress, workers=workers)
+    predictions = spreading.so_far()
     return CrossValidation(
         fitted={run.label: fit.runs[run.label] for run in fitted},
-        predicted={one.label: one.score for one in found},
-        values={one.label: one.values for one in found},
-        blind={one.label: one.blind for one in found},
-        bands=recalibrated(fit.bands, [one.score for one in found])
-        if fit.bands and not done.interrupted
+        predicted={one.label: one.score for one in predictions},
+        values={one.label: one.values for one in predictions},
+        blind={one.label: one.blind for one in predictions},
+        bands=recalibrated(fit.bands, [one.score for one in predictions])
+        if fit.bands and not spreading.interrupted
         else fit.bands,
-        interrupted=done.interrupted,
+        interrupted=spreading.interrupted,
     )

@@ -158,15 +158,17 @@ def reason(comparison: Comparison | None, cost: float, before: float, *, lucky: 
     """
     if comparison is None:
         return "The first rung: where the ladder starts."
-    said = comparison.sentence()
+    words = comparison.sentence()
     if lucky:
-        return f"Refused: the fit is no closer than chance makes it; {said}."
+        return f"Refused: the fit is no closer than chance makes it; {words}."
     if comparison.better:
-        return f"Kept: {said}."
+        return f"Kept: {words}."
     closer = 1 - math.sqrt(cost / before) if before > 0 else 0.0
     if comparison.gain <= 0 and closer > 0.03:
-        return f"Refused: {said}, although the fit is {100 * closer:.3g} % closer: it explains what does not come back."
-    return f"Refused: {said}."
+        return (
+            f"Refused: {words}, although the fit is {100 * closer:.3g} % closer: it explains what does not come back."
+        )
+    return f"Refused: {words}."
 
 
 def stalled(name: str, cost: float, before: float) -> str:

@@ -144,16 +144,16 @@ def climb(
     Raises
     ------
     BadInput
-        When nothing can be held out, or a rung names what was not asked.
+        When nothing can be held out, or a rung names what was not to be estimated.
     """
-    seen = [run for run in runs if run.role == "fit"]
-    rungs = list(rungs) if rungs else default_rungs(rig, seen)
+    fitted = [run for run in runs if run.role == "fit"]
+    rungs = list(rungs) if rungs else default_rungs(rig, fitted)
     check_rungs(rig, rungs)
-    if not seen or (len(seen) == 1 and seen[0].first_part() is seen[0]):
+    if not fitted or (len(fitted) == 1 and fitted[0].first_part() is fitted[0]):
         raise BadInput(
             f"a ladder has to hold something out: two runs with role 'fit', or one of {LEAST_RUN} samples or more"
         )
-    return _Climb(rig, seen, rungs, progress, workers).walk()
+    return _Climb(rig, fitted, rungs, progress, workers).walk()
 
 
 class _Climb:
@@ -205,42 +205,42 @@ class _Climb:
 
     def try_rung(self, rung: Rung, waiting: int) -> bool:
         """Whether a rung is kept."""
-        began, done = time.perf_counter(), len(self.steps)
-        start, stop = done / (done + 1 + waiting), (done + 1) / (done + 1 + waiting)
+        began, before = time.perf_counter(), len(self.steps)
+        start, stop = before / (before + 1 + waiting), (before + 1) / (before + 1 + waiting)
         middle = start + 0.4 * (stop - start)
         self.log.progress = part(self.progress, start, middle, rung.name)
-        kept = [*self.kept, rung]
-        rig, runs = rig_at(self.rig, self.rungs, kept), runs_at(self.runs, kept)
+        retained = [*self.kept, rung]
+        rig, runs = rig_at(self.rig, self.rungs, retained), runs_at(self.runs, retained)
         shown = [runs[0].first_part()] if len(runs) == 1 else runs
         problem = formulate(rig, shown)
         if self.weighed is not None:
             problem.weigh_like(self.weighed)
-        found = self.fit(problem, shown, rung)
-        if found.interrupted:
+        end = self.fit(problem, shown, rung)
+        if end.interrupted:
             raise KeyboardInterrupt
-        if self.values and found.normal.cost > self.cost * (1 + CREEP) and not rung.drops:
-            self.log.warnings.append(stalled(rung.name, found.normal.cost, self.cost))
-        chance = by_chance(len(problem.unknowns) - len(self.values), noise_level(problem, found.x))
-        lucky = bool(self.values) and self.cost - found.normal.cost <= chance and not rung.drops
-        cost = found.normal.cost
-        found = settle_weights(problem, found)
-        if found.interrupted:
+        if self.values and end.normal.cost > self.cost * (1 + CREEP) and not rung.drops:
+            self.log.warnings.append(stalled(rung.name, end.normal.cost, self.cost))
+        chance = by_chance(len(problem.unknowns) - len(self.values), noise_level(problem, end.x))
+        lucky = bool(self.values) and self.cost - end.normal.cost <= chance and not rung.drops
+        cost = end.normal.cost
+        end = settle_weights(problem, end)
+        if end.interrupted:
             raise KeyboardInterrupt
         whole = formulate(rig, shown, thin=False)
-        fitted = {run.label: score_run(whole, i, found.x) for i, run in enumerate(shown)}
+        fitted = {run.label: score_run(whole, i, end.x) for i, run in enumerate(shown)}
         if len(runs) == 1:
             ahead = replace(
                 runs[0], score_from=max(runs[0].score_from, FITTED_SHARE * float(runs[0].t[-1] - runs[0].t[0]))
             )
-            predicted = {ahead.label: score_run(formulate(rig, [ahead], thin=False), 0, found.x)}
+            predicted = {ahead.label: score_run(formulate(rig, [ahead], thin=False), 0, end.x)}
         else:
-            predicted = self.leave_out(problem, found.x, runs, kept, part(self.progress, middle, stop, rung.name))
+            predicted = self.leave_out(problem, end.x, runs, retained, part(self.progress, middle, stop, rung.name))
         comparison = None
         if self.scores:
             poorer, richer = ([scores[run.label] for run in runs] for scores in (self.scores, predicted))
             comparison = compare(poorer, richer, [np.array(run.quanta) for run in runs])
         better = comparison is None or (comparison.better and not lucky)
-        values, shared = problem.values_at(found.x), problem.shared_at(found.x)
+        values, shared = problem.values_at(end.x), problem.shared_at(end.x)
         self.steps.append(
             RungResult(
                 rung=rung,
@@ -248,7 +248,7 @@ class _Climb:
                 reason=reason(comparison, cost, self.cost, lucky=lucky),
                 fitted={label: dict(s.fit_percent) for label, s in fitted.items()},
                 predicted={label: dict(s.fit_percent) for label, s in predicted.items()},
-                cost=found.normal.cost,
+                cost=end.normal.cost,
                 parameters=len(shared),
                 per_run=len(values) - len(shared),
                 values=shared,
@@ -257,22 +257,22 @@ class _Climb:
             )
         )
         if better:
-            self.kept, self.values, self.scores = kept, values, predicted
-            self.cost, self.weighed = found.normal.cost, problem
+            self.kept, self.values, self.scores = retained, values, predicted
+            self.cost, self.weighed = end.normal.cost, problem
         return better
 
     def leave_out(
-        self, problem: Problem, x: Array, runs: list[Run], kept: list[Rung], progress: Progress
+        self, problem: Problem, x: Array, runs: list[Run], retained: list[Rung], progress: Progress
     ) -> dict[str, RunScore]:
         """Every run as predicted by a fit of the others."""
         known = {n: v for n, v in self.values.items() if n in problem.rig.parameters}
-        typical = [n for r in kept for n in r.unknown if n in TYPICAL or n.startswith("scale")]
-        found = leave_one_out(
+        typical = [n for r in retained for n in r.unknown if n in TYPICAL or n.startswith("scale")]
+        left_out = leave_one_out(
             problem.rig, runs, problem.values_at(x), noise=problem.noise, typical=typical,
-            otherwise=known | {n: neutral(problem.rig.plant, n) for n in kept[-1].adds}, progress=progress,
+            otherwise=known | {n: neutral(problem.rig.plant, n) for n in retained[-1].adds}, progress=progress,
             workers=self.workers,
         )  # fmt: skip
-        return {one.label: one.score for one in found.all()}
+        return {one.label: one.score for one in left_out.all()}
 
     def fit(self, problem: Problem, runs: Sequence[Run], rung: Rung) -> Descent:
         """The best fit that can be found from the end of the rung below, or from nothing."""
@@ -287,12 +287,12 @@ class _Climb:
             descend_progressively(problem, problem.place(self.values | c), self.log, horizon=math.inf, tolerance=1e-3)
             for c in candidates
         ]
-        found = reduce(better, ends)
-        end = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6)
-        found = replace(end, interrupted=found.interrupted)
-        if found.normal.cost > POOR * problem.count() and not found.interrupted and rung.adds and starts:
-            found = better(found, search(problem, [problem.place(starts[0])], self.log, patient=False))
-        return found
+        best = reduce(better, ends)
+        end = descend(problem.normal, best.x, problem.lower, problem.upper, tolerance=1e-6)
+        best = replace(end, interrupted=best.interrupted)
+        if best.normal.cost > POOR * problem.count() and not best.interrupted and rung.adds and starts:
+            best = better(best, search(problem, [problem.place(starts[0])], self.log, patient=False))
+        return best
 
 
 def _mean(percents: Percents) -> float:
@@ -338,18 +338,18 @@ def choose_friction(rig: GreyBox, runs: Sequence[Run], log: SearchLog) -> tuple[
             starts = [part.place(tried[-1].values | rung.seeds(rig)), *starts[:1]]
         else:
             starts = [part.start, *starts]
-        found = search(part, starts, log, patient=not tried)
-        if tried and found.normal.cost > tried[-1].cost and not found.interrupted:
+        end = search(part, starts, log, patient=not tried)
+        if tried and end.normal.cost > tried[-1].cost and not end.interrupted:
             # another start looked better over the first seconds and led astray; the poorer fit's end cannot
-            found = better(found, descend_progressively(part, starts[0], log, horizon=math.inf))
-        if found.interrupted:
+            end = better(end, descend_progressively(part, starts[0], log, horizon=math.inf))
+        if end.interrupted:
             raise KeyboardInterrupt
-        cost = found.normal.cost
+        cost = end.normal.cost
         if tried and cost > tried[-1].cost * (1 + 1e-6):
             log.warnings.append(stalled(rung.name, cost, tried[-1].cost))
-        level, v = noise_level(part, found.x), part.value(found.x)
+        level, v = noise_level(part, end.x), part.value(end.x)
         values = {part.key(i): float(v[i]) for i, u in enumerate(part.unknowns) if u.shared or u.lower < v[i] < u.upper}
-        held_out = _held_out(part, found)
+        held_out = _held_out(part, end)
         log.note(f"{rung.name}: held-out cost", held_out, part)
         tried.append(Candidate(rig=here, cost=cost, noise=level, values=values, held_out=held_out))
     k = min(range(len(tried)), key=lambda i: tried[i].held_out)
@@ -358,7 +358,7 @@ def choose_friction(rig: GreyBox, runs: Sequence[Run], log: SearchLog) -> tuple[
 
 
 def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: SearchLog) -> None:
-    """Note what a richer model would have said otherwise, where it explains the runs better.
+    """Note where a richer model differs, where it explains the runs better.
 
     That what is left out is predicted worse then means that something else is missing, not that the richer model is
     wrong. The chosen model comes first.
@@ -394,11 +394,11 @@ def _held_out(problem: Problem, best: Descent) -> float:
         if not any(judges.any() for judges, _ in parts):
             return itself
         part = replace(problem, tracks=[track for _, track in parts])
-        found = descend(part.normal, x, part.lower, part.upper, tolerance=REFIT, limit=10)
-        if found.interrupted:
+        end = descend(part.normal, x, part.lower, part.upper, tolerance=REFIT, limit=10)
+        if end.interrupted:
             raise KeyboardInterrupt
         for index, (track, (judges, _)) in enumerate(zip(problem.tracks, parts, strict=True)):
-            e = problem.residuals(index, found.x)
+            e = problem.residuals(index, end.x)
             e = e[judges] if track.windowed else e[0].reshape(-1, len(track.columns))[judges[track.first :]]
             # one run that slips a cycle should not outvote all others
             total += float(np.sum(np.minimum(e * e, 4.0))) if finite(e) else 4.0 * e.size

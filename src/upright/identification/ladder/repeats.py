@@ -101,13 +101,13 @@ def _overlap(a: Run, b: Run) -> tuple[slice, slice]:
         here, there = slice(i - before, i - before + n), slice(j - before, j - before + n)
         return float(np.abs(a.u[here] - b.u[there]).mean()), here, there
 
-    found = min(from_(0, 0), from_(_first_change(a), _first_change(b)), key=lambda one: one[0])
-    return found[1], found[2]
+    nearest = min(from_(0, 0), from_(_first_change(a), _first_change(b)), key=lambda one: one[0])
+    return nearest[1], nearest[2]
 
 
 def _compare(group: Sequence[Run]) -> Repeats:
     """Every run of a group explained by every other."""
-    found: dict[str, list[float]] = {}
+    percents: dict[str, list[float]] = {}
     errors: dict[str, list[float]] = {run.label: [] for run in group}
     for a, b in permutations(group, 2):
         here, there = _overlap(a, b)
@@ -118,11 +118,11 @@ def _compare(group: Sequence[Run]) -> Repeats:
             y, z = a.y[here, k], b.y[there, k]
             until = None if {"offset", f"offset.{name}"} & {*a.unknown} else rest
             percent = fit_percent(y - y[:until].mean(), z - z[:until].mean())
-            found.setdefault(name, []).append(percent)
+            percents.setdefault(name, []).append(percent)
             errors[a.label].append(log_error(percent))
     return Repeats(
         labels=tuple(run.label for run in group),
-        percents={n: tuple(v) for n, v in found.items()},
+        percents={n: tuple(v) for n, v in percents.items()},
         errors={label: float(np.mean(v)) for label, v in errors.items() if v},
     )
 

@@ -1,4 +1,4 @@
-"""Rungs: models nested in the one that was asked for, poorest first.
+"""Rungs: models nested in the requested one, poorest first.
 
 A rung adds terms to what the rungs below estimate; below it a term is held where it does nothing.
 """
@@ -42,23 +42,23 @@ class Rung:
 
     def seeds(self, rig: GreyBox) -> dict[str, float]:
         """Values of what it adds: a tenth of the way from where each term does nothing to its guess."""
-        found = {n: (neutral(rig.plant, n), rig.parameters[n].value) for n in self.adds}
-        return {n: low + 0.1 * (guess - low) if math.isfinite(low) else guess for n, (low, guess) in found.items()}
+        starts = {n: (neutral(rig.plant, n), rig.parameters[n].value) for n in self.adds}
+        return {n: low + 0.1 * (guess - low) if math.isfinite(low) else guess for n, (low, guess) in starts.items()}
 
 
-def rig_at(rig: GreyBox, rungs: Sequence[Rung], kept: Sequence[Rung]) -> GreyBox:
-    """The rig of a place on the ladder: of all that `rungs` add only what the `kept` ones do."""
+def rig_at(rig: GreyBox, rungs: Sequence[Rung], accepted: Sequence[Rung]) -> GreyBox:
+    """The rig of a place on the ladder: of all that `rungs` add only what the `accepted` ones do."""
     added = {n for rung in rungs for n in (*rung.adds, *rung.drops)}
     estimated = {n for n in added if not any(n in rung.adds for rung in rungs)}  # asked from the beginning
-    for rung in kept:
+    for rung in accepted:
         estimated |= set(rung.adds)
         estimated -= set(rung.drops)
     return rig.without(added - estimated)
 
 
-def runs_at(runs: Sequence[Run], kept: Sequence[Rung]) -> list[Run]:
+def runs_at(runs: Sequence[Run], accepted: Sequence[Rung]) -> list[Run]:
     """The runs with what the kept rungs estimate run by run."""
-    more = tuple(n for rung in kept for n in rung.unknown)
+    more = tuple(n for rung in accepted for n in rung.unknown)
     return [replace(run, unknown=tuple(dict.fromkeys((*run.unknown, *more)))) for run in runs]
 
 
@@ -67,7 +67,7 @@ def friction_rungs(rig: GreyBox) -> list[Rung]:
 
     A term that must not be zero, since its lower bound is above, is part of them all.
     """
-    asked = [n for n in rig.estimated if rig.parameters[n].lower <= 0]
+    estimated = [n for n in rig.estimated if rig.parameters[n].lower <= 0]
     joints = rig.plant.derived().joints
     kinds = [
         ("Coulomb friction", {j.coulomb for j in joints}),
@@ -75,7 +75,7 @@ def friction_rungs(rig: GreyBox) -> list[Rung]:
         ("stiction", {n for j in joints for n in (j.stiction, j.stribeck_speed)}),
         ("presliding", {j.presliding for j in joints}),
     ]
-    steps = [(name, tuple(n for n in asked if n in terms)) for name, terms in kinds]
+    steps = [(name, tuple(n for n in estimated if n in terms)) for name, terms in kinds]
     return [Rung(name="viscous friction"), *(Rung(name=name, adds=adds) for name, adds in steps if adds)]
 
 
@@ -85,16 +85,16 @@ def default_rungs(rig: GreyBox, runs: Sequence[Run]) -> list[Rung]:
     The last one needs two runs and some friction.
     """
     friction = friction_rungs(rig)
-    found = friction if len(friction) > 1 else [Rung(name="as asked")]
+    rungs = friction if len(friction) > 1 else [Rung(name="as asked")]
     for name, terms in DRIVE:
         adds = tuple(n for n in rig.estimated if n in terms)
         if adds:
-            found.append(Rung(name=name, adds=adds))
-    seen = [run for run in runs if run.role == "fit"]
-    told = any("friction" in (*run.unknown, *run.shared) for run in seen)
-    if len(seen) > 1 and not told and any(_present(rig, n) for n in friction_names(rig)):
-        found.append(Rung(name="friction of each run", unknown=("friction",)))
-    return found
+            rungs.append(Rung(name=name, adds=adds))
+    fitted = [run for run in runs if run.role == "fit"]
+    varies = any("friction" in (*run.unknown, *run.shared) for run in fitted)
+    if len(fitted) > 1 and not varies and any(_present(rig, n) for n in friction_names(rig)):
+        rungs.append(Rung(name="friction of each run", unknown=("friction",)))
+    return rungs
 
 
 def _present(rig: GreyBox, name: str) -> bool:
@@ -103,7 +103,7 @@ def _present(rig: GreyBox, name: str) -> bool:
 
 
 def check_rungs(rig: GreyBox, rungs: Sequence[Rung]) -> None:
-    """Refuse rungs that add what nobody asked for, or the same term twice.
+    """Refuse rungs that add what was not requested, or the same term twice.
 
     Raises
     ------

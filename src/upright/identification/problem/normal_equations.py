@@ -25,7 +25,7 @@ class Normal:
 
     @classmethod
     def lost(cls, size: int) -> Normal:
-        """What is said of a point from where the model runs away: an infinite cost."""
+        """Cost of a point from where the model diverges: an infinite cost."""
         return cls(math.inf, np.zeros((size, size)), np.zeros(size))
 
     @classmethod
@@ -46,7 +46,7 @@ class Normal:
 
 
 def finite(values: Array) -> bool:
-    """Whether all values are finite, told by their sum: one pass without a temporary."""
+    """Whether all values are finite, tested by their sum: one pass without a temporary."""
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(values.sum()))
 
@@ -62,14 +62,14 @@ def slopes(lanes: Array, steps: Array, *, central: bool = False) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         if not central:
             return (ahead - here) / steps
-        found = (ahead - lanes[..., n + 1 :]) / (2 * steps)
-        if finite(found * found):
-            return found
+        out = (ahead - lanes[..., n + 1 :]) / (2 * steps)
+        if finite(out * out):
+            return out
         sides = np.stack([(ahead - here) / steps, (here - lanes[..., n + 1 :]) / steps])
         tells = np.isfinite(np.sum(sides * sides, axis=tuple(range(1, sides.ndim - 1))))
         for k in np.flatnonzero(tells.any(axis=0) & ~tells.all(axis=0)):
-            found[..., k] = sides[int(np.argmax(tells[:, k])), ..., k]
-    return found
+            out[..., k] = sides[int(np.argmax(tells[:, k])), ..., k]
+    return out
 
 
 def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array, scale: Array | None = None) -> Array:

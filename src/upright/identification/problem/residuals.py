@@ -139,7 +139,7 @@ class Problem:
     def count(self, horizon: float = math.inf) -> int:
         """Number of residuals within `horizon` seconds."""
         return sum(
-            (t.within(horizon) if t.kept is None else int(np.count_nonzero(t.kept[: t.within(horizon)])))
+            (t.within(horizon) if t.retained is None else int(np.count_nonzero(t.retained[: t.within(horizon)])))
             * t.restarts.size * max(1, int(np.count_nonzero(t.weights)))
             for t in self.tracks
         )  # fmt: skip
@@ -176,9 +176,9 @@ class Problem:
     def ahead(self, seconds: float) -> Problem:
         """The problem with its filtered runs predicted so many seconds ahead alone, from the same restarts."""
         tracks = [t.predicting(seconds) if t.ahead else t for t in self.tracks]
-        found = replace(self, tracks=tracks)
-        found._solvers.update(self._solvers)
-        return found
+        further = replace(self, tracks=tracks)
+        further._solvers.update(self._solvers)
+        return further
 
     def _setting(self, index: int, x: Array) -> Setting:
         """What one run is simulated with, for coordinates `x` (sought, lanes)."""
@@ -332,12 +332,12 @@ class Problem:
             self._memory = np.empty(most)
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
         skip = min(track.first, n - 1)
-        counts = slice(skip, n) if track.kept is None else np.flatnonzero(track.kept[:n])
-        seen = [motion[counts, c] for c in track.columns]
+        counts = slice(skip, n) if track.retained is None else np.flatnonzero(track.retained[:n])
+        observed = [motion[counts, c] for c in track.columns]
         if track.principal is None:
-            G = squares(seen, track.y[counts], d.offsets, track.weights, d.scales)
+            G = squares(observed, track.y[counts], d.offsets, track.weights, d.scales)
         else:
-            G = squares(*mixed(seen, track.y[counts], d.offsets, d.scales, track.principal))
+            G = squares(*mixed(observed, track.y[counts], d.offsets, d.scales, track.principal))
         h = self.steps[sought]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
@@ -393,11 +393,11 @@ class Problem:
 
 
 def formulate(
-    rig: GreyBox, runs: Sequence[Run], *, thin: bool = True, given: Mapping[str, Mapping[str, float]] | None = None
+    rig: GreyBox, runs: Sequence[Run], *, thin: bool = True, stated: Mapping[str, Mapping[str, float]] | None = None
 ) -> Problem:
     """Set up the problem of explaining `runs`.
 
-    `thin` drops samples of free runs that their period does not need; `given` holds what is known of a group of runs,
+    `thin` drops samples of free runs that their period does not need; `stated` holds what is known of a group of runs,
     by its label and name.
     """
     tracks = [prepare(rig, run, thin=thin) for run in runs]
@@ -406,7 +406,7 @@ def formulate(
         place = next((i for i, o in enumerate(unknowns) if u.group and (o.name, o.group) == (u.name, u.group)), None)
         if place is not None:
             unknowns[place] = replace(unknowns[place], runs=(*unknowns[place].runs, *u.runs))
-        elif (value := (given or {}).get(u.group, {}).get(u.name)) is not None:
+        elif (value := (stated or {}).get(u.group, {}).get(u.name)) is not None:
             unknowns.append(replace(u, value=value, lower=value, upper=value))
         else:
             unknowns.append(u)
@@ -422,7 +422,7 @@ def resolved(rig: GreyBox, runs: Sequence[Run], unknowns: Sequence[Unknown]) -> 
     least = _shortest(rig, runs)
     return [
         replace(u, lower=least[u.name], value=max(u.value, least[u.name]))
-        if u.asked and u.name in least and u.lower < least[u.name] <= u.upper
+        if u.estimated and u.name in least and u.lower < least[u.name] <= u.upper
         else u
         for u in unknowns
     ]
@@ -434,14 +434,14 @@ def unresolved(problem: Problem, x: Array) -> tuple[str, ...]:
     return tuple(
         u.name
         for u, value in zip(problem.unknowns, problem.value(x), strict=True)
-        if u.asked and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
+        if u.estimated and u.name in least and u.lower == least[u.name] and value <= u.lower * (1 + 1e-6)
     )
 
 
 def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
     """Limits at coordinates `x` that no run reaches: knees and largest forces without which the cost is the same."""
     plant = problem.rig.plant
-    limits = [i for i, u in enumerate(problem.unknowns) if u.asked and u.shared and u.log]
+    limits = [i for i, u in enumerate(problem.unknowns) if u.estimated and u.shared and u.log]
     limits = [i for i in limits if math.isinf(neutral(plant, problem.unknowns[i].name))]
     most = problem.cost(x) * (1 + SAME) if limits else 0.0
 
@@ -456,8 +456,8 @@ def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
 def _shortest(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:
     """Least presliding length worth telling, by its name."""
     derived = rig.plant.derived()
-    seen = [pair for run in runs for pair in zip(run.measured, run.resolution, strict=False)]
-    steps = [min((resolution for name, resolution in seen if name == c), default=0.0) for c in derived.coordinates]
+    pairs = [pair for run in runs for pair in zip(run.measured, run.resolution, strict=False)]
+    steps = [min((resolution for name, resolution in pairs if name == c), default=0.0) for c in derived.coordinates]
     return {j.presliding: ROUNDING * float(np.abs(j.direction) @ steps) for j in derived.joints if j.presliding}
 
 
@@ -479,7 +479,7 @@ def noise_level(problem: Problem, x: Array) -> float:
     for index, track in enumerate(problem.tracks):
         y = problem.simulate(index, x[:, None], track.length)[:, :, :, 0]
         e = (y - track.targets(track.length)) @ track.weighting.T
-        e = np.moveaxis(e if track.kept is None else e[track.kept], 1, 0)
+        e = np.moveaxis(e if track.retained is None else e[track.retained], 1, 0)
         e = e.reshape(len(e), -1) if track.ahead else e.reshape(-1, len(track.columns))
         alike = max(1.0, 2 * memory(e, track.spacing) / track.spacing - 1)
         squares += alike * float(np.sum(e * e))

@@ -308,23 +308,23 @@ def with_noise(rig: GreyBox, runs: Sequence[Run]) -> GreyBox:
     values: dict[str, float] = {**base_values(rig), **run.known}
     level = dict(zip(rig.plant.state_names(), nearest_equilibrium(rig, run), strict=True))
     M, _, _, _ = small_motions(rig.plant.derived(), {**values, **level})
-    found = dict(rig.parameters)
+    parameters = dict(rig.parameters)
     for i, c in enumerate(rig.plant.coordinates):
-        if c.name not in moving or f"{NOISE}{c.name}" in found:
+        if c.name not in moving or f"{NOISE}{c.name}" in parameters:
             continue
         y = next(r.y[:, r.measured.index(c.name)] for r in filtered if c.name in r.measured)
         force = float(M[i, i]) * float(np.std(y)) / run.horizons[0] ** 2
-        found[f"{NOISE}{c.name}"] = Parameter(
+        parameters[f"{NOISE}{c.name}"] = Parameter(
             name=f"{NOISE}{c.name}", value=EASE * force * math.sqrt(run.horizons[0]) or 1e-9,
             unit=f"{'N m' if c.unit == 'rad' else 'N'} s^(1/2)", estimate=True, lower=0.0,
             meaning=f"random force on {c.name}, root of its density",
         )  # fmt: skip
     for k, i in enumerate(rig.plant.inputs):
-        if i.name in driven and f"{NOISE}{i.name}" not in found:
+        if i.name in driven and f"{NOISE}{i.name}" not in parameters:
             size = max(float(np.std(r.u[:, k])) for r in filtered)
             unit = rig.parameters["actuator.offset"].unit if "actuator.offset" in rig.parameters else "1"
-            found[f"{NOISE}{i.name}"] = Parameter(
+            parameters[f"{NOISE}{i.name}"] = Parameter(
                 name=f"{NOISE}{i.name}", value=0.1 * DRIFT * size, unit=f"{unit} s^(-1/2)", estimate=True, lower=0.0,
                 meaning=f"drift of the command of {i.name}, root of its variance per time",
             )  # fmt: skip
-    return replace(rig, parameters=found)
+    return replace(rig, parameters=parameters)

@@ -108,7 +108,7 @@ class Track:
     variance: Array
     ahead: FilterPlan | None = None
     missed: Array | None = None
-    kept: NDArray[np.bool_] | None = None
+    retained: NDArray[np.bool_] | None = None
 
     @property
     def windowed(self) -> bool:
@@ -192,7 +192,7 @@ class Track:
         if self.run.t.size < LEAST_RUN or not judges.any():
             return np.zeros(count, dtype=bool), self
         if not self.windowed:
-            return judges, replace(self, kept=~judges)
+            return judges, replace(self, retained=~judges)
         stay = ~judges
         return judges, replace(self, restarts=self.restarts[stay], x0=self.x0[stay], variance=self.variance[stay])
 
@@ -201,7 +201,7 @@ class Track:
         skip = min(self.first, len(y) - 1)
         with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away is told by its NaN
             e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
-        return e if self.kept is None else e * self.kept[skip : len(y), None, None]
+        return e if self.retained is None else e * self.retained[skip : len(y), None, None]
 
     def targets(self, samples: int) -> Array:
         """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""
@@ -236,13 +236,13 @@ def prepare(rig: GreyBox, run: Run, *, thin: bool) -> Track:
 
     x, sizes, errors = np.zeros((n, len(names))), np.ones(len(names)), np.zeros(len(names))
     variance = np.zeros((restarts.size, len(names)))
-    taken = np.zeros(len(columns))
+    offsets = np.zeros(len(columns))
     for k, (c, column) in enumerate(zip(run.measured, columns, strict=True)):
         width = smoothing_width(run.y[:, k], period_s, period, run.quanta[k])
         motion = savitzky_golay(run.y[:, k], period_s, width, derivatives=1)
         x[:, column], x[:, column + 1] = motion.q, motion.v
         sizes[column], sizes[column + 1] = scatter(motion.q), scatter(motion.v)
-        taken[k] = np.std(run.y[:, k] - motion.q)
+        offsets[k] = np.std(run.y[:, k] - motion.q)
         errors[column : column + 2] = end_errors(run.y[:, k], motion.q, period_s, width)
         if c in run.held:
             sizes[column : column + 2] = 1.0
@@ -271,7 +271,7 @@ def prepare(rig: GreyBox, run: Run, *, thin: bool) -> Track:
             held[c] = Held(q=motion.q[::stride])
     start, ahead = State(x=x[0].copy(), spread=sizes, error=errors), None
     if run.filtered:
-        ahead, restarts = filter_plan(rig, run, dt, start, taken)
+        ahead, restarts = filter_plan(rig, run, dt, start, offsets)
         length, variance = len(ahead.samples), np.zeros((restarts.size, len(names)))
     weights = np.array([0.0 if c in run.held else 1.0 / scatter(run.y[:, k]) for k, c in enumerate(run.measured)])
     return Track(
@@ -348,4 +348,4 @@ def nearest_equilibrium(rig: GreyBox, run: Run) -> Array:
                 far += (value - x[names.index(c)]) ** 2
         return far, x
 
-    return min(map(near, rig.plant.equilibria.values()), key=lambda found: found[0])[1]
+    return min(map(near, rig.plant.equilibria.values()), key=lambda near_by: near_by[0])[1]

@@ -1,4 +1,4 @@
-"""Runs whose drive went off, or came on, at another moment than logged: told, and guessed where it is asked."""
+"""Runs whose drive went off, or came on, at another moment than logged: reported, and guessed where it is estimated."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from upright.signals.trips import CLEAR, Terms, Trip, linear, trip_or_misfit
 def find_trips(rig: GreyBox, run: Run) -> list[Trip]:
     """A late begin and an early end of the first input's effect in one run, as far as its motion shows them.
 
-    Nothing is said of runs whose driven coordinate was not measured, or whose law is simulated.
+    Runs are left out whose driven coordinate was not measured, or whose law is simulated.
     """
     return _moments(rig, run)[0]
 
@@ -42,13 +42,13 @@ class Moments:
 
 def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     """What `find_trips` says, and whether the command plainly acts until its logged end."""
-    found: list[Trip] = []
+    trips: list[Trip] = []
     plain = False
     if not rig.plant.inputs or run.loop is not None:
-        return found, plain
+        return trips, plain
     on = rig.plant.inputs[0].on
     if on not in run.measured or on in run.held or not np.any(run.u[:, 0]):
-        return found, plain
+        return trips, plain
     resolution = dict(zip(run.measured, run.quanta, strict=True))
     signals = {c: run.y[:, k] for k, c in enumerate(run.measured)}
     signals |= {c: v for c, v in run.held.items() if isinstance(v, np.ndarray)}
@@ -57,20 +57,20 @@ def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     terms = _terms(rig, [on, *others])
     gain = rig.parameters["actuator.gain"].value if "actuator.gain" in rig.parameters else 1.0
     for late in (False, True):
-        u = silenced(run, found).u[:, 0] * math.copysign(1.0, gain)
+        u = silenced(run, trips).u[:, 0] * math.copysign(1.0, gain)
         trip, otherwise = trip_or_misfit(
             run.t, u, signals[on], [*others.values()], resolution=resolution[on], late=late, terms=terms
         )
-        found += [trip] if trip is not None else []
+        trips += [trip] if trip is not None else []
         plain = plain or (not late and trip is None and otherwise < CLEAR[1])
-    return found, plain
+    return trips, plain
 
 
 def _terms(rig: GreyBox, measured: list[str]) -> Terms:
     """What acts on the first coordinate by its equation of motion, which needs the motion of all."""
     coordinates = [c.name for c in rig.plant.coordinates]
-    asked = {n for n, p in rig.parameters.items() if p.value or p.estimate}
-    equations, driven = regressor(rig.plant, frozenset(rig.plant.optional) - asked), coordinates.index(measured[0])
+    acting = {n for n, p in rig.parameters.items() if p.value or p.estimate}
+    equations, driven = regressor(rig.plant, frozenset(rig.plant.optional) - acting), coordinates.index(measured[0])
     if set(coordinates) - set(measured) or equations.own(driven) is None:
         return linear
     order = [measured.index(c) for c in coordinates]
@@ -82,40 +82,40 @@ def trip_sentence(run: Run, trip: Trip) -> str:
     t = float(run.t[0])
     what, until = ("come on only", "from") if trip.late else ("gone off", "until")
     name = "input_start" if trip.late else "input_end"
-    asked = ", ".join(f'"{n}"' for n in (*run.unknown, name))
+    listed = ", ".join(f'"{n}"' for n in (*run.unknown, name))
     return (
         f"In run '{run.label}' the drive seems to have {what} at {t + trip.at:.4g} s although the command is logged "
         f"{until} {t + trip.logged:.4g} s (acceleration {trip.before:.3g} before, {trip.after:.3g} after): "
-        f"declare unknown = [{asked}]."
+        f"declare unknown = [{listed}]."
     )
 
 
 def with_trip_guesses(rig: GreyBox, run: Run, moments: Moments | None = None) -> Run:
-    """The run with guesses of when its input really began and ended, for those of the two that are asked.
+    """The run with guesses of when its input really began and ended, for those of the two that are estimated.
 
     Where the motion plainly follows the command until its logged end, the guess is what the log says.
     """
-    asked = [n for n in ("input_start", "input_end") if n in run.unknown and n not in run.guesses]
-    if not asked:
+    wanted = [n for n in ("input_start", "input_end") if n in run.unknown and n not in run.guesses]
+    if not wanted:
         return run
     trips, plain = (moments or Moments(rig)).of(run)
-    found = {"input_start" if trip.late else "input_end": trip.at for trip in trips}
+    guesses = {"input_start" if trip.late else "input_end": trip.at for trip in trips}
     if plain:  # a sample inside: at the logged moment itself nothing changes with it
-        found["input_end"] = run.period * float(np.flatnonzero(run.u[:, 0])[-1])
-    return replace(run, guesses={**{n: found[n] for n in asked if n in found}, **run.guesses})
+        guesses["input_end"] = run.period * float(np.flatnonzero(run.u[:, 0])[-1])
+    return replace(run, guesses={**{n: guesses[n] for n in wanted if n in guesses}, **run.guesses})
 
 
 def unasked_trips(rig: GreyBox, runs: Sequence[Run], moments: Moments | None = None) -> list[str]:
-    """Sentences on drives that went off or came on where nobody asked when."""
+    """Sentences on drives that went off or came on where the moment is not estimated."""
     if any(n in rig.estimated for n in ("actuator.start", "actuator.end")):
         return []
-    said: list[str] = []
+    sentences: list[str] = []
     moments = moments or Moments(rig)
     for run in runs:
         for trip in moments.of(run)[0]:
             if ("input_start" if trip.late else "input_end") not in run.unknown:
-                said.append(trip_sentence(run, trip))
-    return said
+                sentences.append(trip_sentence(run, trip))
+    return sentences
 
 
 def silenced(run: Run, trips: Sequence[Trip]) -> Run:

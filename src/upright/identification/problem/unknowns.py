@@ -39,7 +39,7 @@ class Unknown:
     `runs` are the places of the runs it belongs to, or `SHARED` for all, `group` the label of those that share it,
     empty for a number of one run or of all. Start and bounds are in SI; the coordinate in which it is sought is its
     logarithm if `log`. In that coordinate `scale` is a change that would matter and `prior` the mean and standard
-    deviation known beforehand. A known number with an uncertainty is sought but not `asked`.
+    deviation known beforehand. A known number with an uncertainty is fitted but not `estimated`.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Unknown:
     log: bool
     scale: float
     prior: tuple[float, float] | None = None
-    asked: bool = True
+    estimated: bool = True
     group: str = ""
 
     @property
@@ -98,7 +98,7 @@ def _shared(rig: GreyBox, p: Parameter) -> Unknown:
     scale = 1.0 if log else max(size, p.uncertainty) or _FALLBACK.get(p.name, 1e-3)
     return Unknown(
         name=p.name, runs=SHARED, value=value, lower=lower, upper=upper, log=log, scale=scale, prior=prior,
-        asked=p.estimate,
+        estimated=p.estimate,
     )  # fmt: skip
 
 
@@ -121,8 +121,8 @@ def friction_names(rig: GreyBox) -> tuple[str, ...]:
 def matters(rig: GreyBox, coordinate: str, by: float = 1.0) -> bool:
     """Whether a coordinate's own value, not only its changes, is felt: by gravity, a spring or the mass matrix.
 
-    A constant error of the sensor cannot be told from the place where the run began otherwise. Of an angle that comes
-    round a change `by` one turn is not felt.
+    A constant error of the sensor cannot be separated from the place where the run began otherwise. Of an angle that
+    comes round a change `by` one turn is not felt.
     """
     from upright.physics.equations import evaluated
 
@@ -153,12 +153,12 @@ INITIAL_SPREAD = (0.02, 0.1)
 
 def run_unknowns(rig: GreyBox, index: int, run: Run, start: State) -> list[Unknown]:
     """What is sought for one run alone; `start` is its measured first state and its uncertainty."""
-    found: list[Unknown] = []
+    unknowns: list[Unknown] = []
     wanted = {*run.unknown, *run.shared}
 
     def add(name: str, value: float, scale: float, prior: tuple[float, float] | None = None,
             lower: float = -math.inf, upper: float = math.inf, *, log: bool = False) -> None:  # fmt: skip
-        found.append(
+        unknowns.append(
             Unknown(name=name, runs=(index,), value=value, lower=lower, upper=upper, log=log, scale=scale,
                     prior=prior, group=run.shared.get(name, ""))
         )  # fmt: skip
@@ -202,17 +202,17 @@ def run_unknowns(rig: GreyBox, index: int, run: Run, start: State) -> list[Unkno
                 # where the command plainly acted as logged, a trip would only excuse wrong parameters
                 near = NEAR * MOMENT if name in run.guesses and abs(guess - logged) < dt else math.inf
                 add(name, guess, MOMENT, lower=max(first, guess - near), upper=min(last, guess + near))
-    return found
+    return unknowns
 
 
 def _commanded(run: Run) -> NDArray[np.bool_]:
-    """Samples (N,) at which something is asked of the drive; by a loop, from the first change of its reference on."""
-    asked = np.asarray(run.u.any(axis=1), dtype=bool)
+    """Samples (N,) at which the drive is commanded; by a loop, from the first change of its reference on."""
+    commanded = np.asarray(run.u.any(axis=1), dtype=bool)
     if run.loop is not None:
         r = run.loop.law.signal()[: run.t.size]
         changed = np.flatnonzero((r != r[:1]).any(axis=1))
-        asked[int(changed[0]) if changed.size else 0 :] = True
-    return asked
+        commanded[int(changed[0]) if changed.size else 0 :] = True
+    return commanded
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,8 +38,8 @@ class SearchLog:
 
     `best` holds the problem last worked on and where in it the search stood, `lower` a problem, a lower cost of it met
     since and where, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the
-    rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; asked only when a fit is poor,
-    since no search mends a reversed sign.
+    rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; evaluated only when a fit is
+    poor, since no search mends a reversed sign.
     """
 
     progress: Progress = silent
@@ -174,15 +174,15 @@ def _solve(A: Array, b: Array) -> Array:
 
 def reach(problem: Problem, x: Array) -> float:
     """Seconds over which every run, simulated with coordinates `x`, stays within its own spread of the data."""
-    found = math.inf
+    seconds = math.inf
     for index, track in enumerate(problem.tracks):
         if track.windowed:
             continue
         e = problem.simulate(index, x[:, None], track.length)[:, 0, :, 0] - track.targets(track.length)[:, 0]
         lost = np.flatnonzero(~(np.abs(e * track.weights).max(axis=1) < 1.0))
         if lost.size:
-            found = min(found, lost[0] * track.dt)
-    return found
+            seconds = min(seconds, lost[0] * track.dt)
+    return seconds
 
 
 def first_horizon(problem: Problem) -> float:
@@ -228,20 +228,20 @@ def descend_progressively(
         last = h >= whole
         name = "whole runs" if last else f"first {h:.3g} s"
         share = h / whole if math.isfinite(whole) else 1.0
-        found = descend(
+        end = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
             tolerance=tolerance if last else 1e-3, limit=60 if last else 25, here=here,
             report=lambda cost, name=name, share=share: log.tell(name, share, cost, problem),
         )  # fmt: skip
-        x = found.x
-        log.note(name, found.normal.cost, problem)
-        if last or found.interrupted:
-            return found
+        x = end.x
+        log.note(name, end.normal.cost, problem)
+        if last or end.interrupted:
+            return end
         try:
-            problem.rescale_steps(found.normal, h)
+            problem.rescale_steps(end.normal, h)
             followed = reach(problem, x)
         except KeyboardInterrupt:
-            return replace(found, converged=False, interrupted=True)
+            return replace(end, converged=False, interrupted=True)
         here = None
         h = min(whole, max(2 * h, followed))
         if h > 0.7 * whole:

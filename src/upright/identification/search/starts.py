@@ -121,7 +121,7 @@ def samples_of(
     turns: Mapping[str, float] | None = None,
 ) -> list[Sample]:
     """Smoothed motion of every run that allows it, long runs thinned to at most `most` samples, 1500 or more each."""
-    found: list[Sample] = []
+    samples: list[Sample] = []
     most = max(1500, 6000 // max(len(runs), 1)) if most is None else most
     for run in runs:
         k = -(-run.t.size // most)
@@ -131,8 +131,8 @@ def samples_of(
             thin = replace(run.samples(slice(None, None, k)), loop=loop)
         sample = observe(rig, thin, flips=flips, turns=turns)
         if sample is not None:
-            found.append(sample)
-    return found
+            samples.append(sample)
+    return samples
 
 
 def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:
@@ -181,7 +181,7 @@ class Agreement:
 
 def regress(rig: GreyBox, samples: list[Sample], *, tolerance: float = 1e-5) -> Agreement:
     """Least squares on the accelerations over the numbers to estimate, to a relative `tolerance` of their squares."""
-    unknowns = [u for u in shared_unknowns(rig) if u.asked]
+    unknowns = [u for u in shared_unknowns(rig) if u.estimated]
     base = base_values(rig)
     count = sum(s.measured[0].size for s in samples)
     x0 = np.array([_coordinate(u, base[u.name]) for u in unknowns])
@@ -206,9 +206,9 @@ def regress(rig: GreyBox, samples: list[Sample], *, tolerance: float = 1e-5) -> 
         return Normal.by_differences(pulled, x, 1e-5 * np.where(log, 1.0, np.maximum(np.abs(x), scale)))
 
     lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
-    found = descend(normal, x0, lower, upper, tolerance=tolerance, limit=40)
-    r = residual(found.x)
-    return Agreement(values=values(found.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
+    end = descend(normal, x0, lower, upper, tolerance=tolerance, limit=40)
+    r = residual(end.x)
+    return Agreement(values=values(end.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
 
 
 def _coordinate(u: Unknown, value: float) -> float:
@@ -265,11 +265,11 @@ def friction_from_energy(rig: GreyBox, samples: list[Sample], values: Mapping[st
         return {}
     A, b = np.concatenate(matrix), np.concatenate(lost)
     norms = np.linalg.norm(A, axis=0)
-    seen = norms > 0
-    if not seen.any():
+    moves = norms > 0
+    if not moves.any():
         return {}
-    solution = nnls(A[:, seen] / norms[seen], b)[0] / norms[seen]
-    return dict(zip([n for n, k in zip(sought, seen, strict=True) if k], (float(z) for z in solution), strict=True))
+    solution = nnls(A[:, moves] / norms[moves], b)[0] / norms[moves]
+    return dict(zip([n for n, k in zip(sought, moves, strict=True) if k], (float(z) for z in solution), strict=True))
 
 
 def _cuts(s: Sample) -> NDArray[np.int64]:

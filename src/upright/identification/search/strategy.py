@@ -93,11 +93,11 @@ def closed_form_starts(rig: GreyBox, runs: Sequence[Run]) -> list[dict[str, floa
     agreement = regress(rig, samples)
     if not math.isfinite(agreement.unexplained):
         return []
-    found = [agreement.values]
+    starts = [agreement.values]
     friction = friction_from_energy(rig, samples, agreement.values)
     if friction:
-        found.insert(0, agreement.values | friction)
-    return found
+        starts.insert(0, agreement.values | friction)
+    return starts
 
 
 def search(problem: Problem, candidates: Sequence[Array], log: SearchLog, *, patient: bool = True) -> Descent:
@@ -105,14 +105,14 @@ def search(problem: Problem, candidates: Sequence[Array], log: SearchLog, *, pat
     h = min(problem.duration, first_horizon(problem))
     ranked = _ranked(problem, candidates, h)
     log.best = problem, ranked[0]
-    found = descend_progressively(problem, ranked[0], log)
-    log.best = problem, found.x
-    if found.interrupted or not patient:
-        return found
+    end = descend_progressively(problem, ranked[0], log)
+    log.best = problem, end.x
+    if end.interrupted or not patient:
+        return end
     n = problem.count()
     others = list(ranked[1:])
     attempts, x_size = 0, problem.start.size + 1
-    while found.normal.cost > POOR * n and attempts < 3 and not found.interrupted:
+    while end.normal.cost > POOR * n and attempts < 3 and not end.interrupted:
         if problem.evaluations * n * x_size > PATIENCE or log.conventions():
             break
         attempts += 1
@@ -124,9 +124,9 @@ def search(problem: Problem, candidates: Sequence[Array], log: SearchLog, *, pat
             attempts = 3
         log.note(name, problem.cost(x, h), problem)
         other = descend_progressively(problem, x, log)
-        found = better(found, other)
-        log.best = problem, found.x
-    return found
+        end = better(end, other)
+        log.best = problem, end.x
+    return end
 
 
 def better(a: Descent, b: Descent) -> Descent:
@@ -142,29 +142,29 @@ Of the twist of two disks 79, 79 and 74 percent were explained after one, two an
 """
 
 
-def settle_weights(problem: Problem, found: Descent) -> Descent:
+def settle_weights(problem: Problem, end: Descent) -> Descent:
     """Weigh prior knowledge, and outputs that move alike, by the residuals found, and settle again."""
     for k in range(3):
-        if found.interrupted or not math.isfinite(found.normal.cost):  # nothing to weigh by
+        if end.interrupted or not math.isfinite(end.normal.cost):  # nothing to weigh by
             break
-        changed = k < REWEIGHED and problem.weigh_components(found.x)
-        if not (_weigh_priors(problem, found) or changed):
+        changed = k < REWEIGHED and problem.weigh_components(end.x)
+        if not (_weigh_priors(problem, end) or changed):
             break
-        found = descend(problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6)
-    return found
+        end = descend(problem.normal, end.x, problem.lower, problem.upper, tolerance=1e-6)
+    return end
 
 
-def _weigh_priors(problem: Problem, found: Descent) -> bool:
+def _weigh_priors(problem: Problem, end: Descent) -> bool:
     """Weigh prior knowledge by the residuals found, memory included, unless it hardly pulls; whether that matters."""
     if not any(u.prior is not None for u in problem.unknowns):
         return False
-    r, J = problem.prior_rows(found.x)
-    pull = pseudo_inverse(found.normal.matrix) @ (J.T @ r)
-    variance = found.normal.cost / problem.count()
-    error = np.sqrt(np.maximum(np.diag(pseudo_inverse(found.normal.matrix)) * variance, 0.0))
+    r, J = problem.prior_rows(end.x)
+    pull = pseudo_inverse(end.normal.matrix) @ (J.T @ r)
+    variance = end.normal.cost / problem.count()
+    error = np.sqrt(np.maximum(np.diag(pseudo_inverse(end.normal.matrix)) * variance, 0.0))
     if np.all(np.abs(pull) <= 0.02 * error) and not any(u.prior and u.shared for u in problem.unknowns):
         return False
-    noise = max(noise_level(problem, found.x), 1e-9)
+    noise = max(noise_level(problem, end.x), 1e-9)
     if abs(math.log(noise / problem.noise)) < NOTICED:
         return False
     problem.noise = noise
@@ -206,9 +206,9 @@ LITTLE = 0.1
 """A mean squared residual above this, a fit of less than 68 %, is a model that explains too little to go on with."""
 
 
-def explains_little(problem: Problem, found: Descent) -> bool:
+def explains_little(problem: Problem, end: Descent) -> bool:
     """Whether so little is explained that neither other valleys nor careful intervals are worth their time."""
-    return not found.normal.cost <= LITTLE * problem.count()
+    return not end.normal.cost <= LITTLE * problem.count()
 
 
 AWAY = (1.0, 3.0)
@@ -219,37 +219,37 @@ SHARE = 0.4
 
 
 def other_valleys(
-    problem: Problem, found: Descent, log: SearchLog, *, attempts: tuple[int, int] = ATTEMPTS, seed: int = 0
+    problem: Problem, end: Descent, log: SearchLog, *, attempts: tuple[int, int] = ATTEMPTS, seed: int = 0
 ) -> Descent:
     """The lowest optimum met by descents from around the one found, every number moved by `AWAY` standard errors.
 
     Stiction, trips and cycles slipped fold the cost into valleys a few standard errors apart; of descents from one
     standard error away six in ten ended lower, where there was a lower one. Filters see smooth costs, dearly.
     """
-    if any(track.ahead for track in problem.tracks) or explains_little(problem, found):
-        return found
-    if found.interrupted or found.normal.cost <= GOOD * problem.count():
-        return found
+    if any(track.ahead for track in problem.tracks) or explains_little(problem, end):
+        return end
+    if end.interrupted or end.normal.cost <= GOOD * problem.count():
+        return end
     rng = np.random.default_rng(seed)
-    sigma, failed = _errors(problem, found), 0
-    shares = [1.0 if u.log else max(abs(v), u.scale) for u, v in zip(problem.unknowns, found.x, strict=True)]
+    sigma, failed = _errors(problem, end), 0
+    shares = [1.0 if u.log else max(abs(v), u.scale) for u, v in zip(problem.unknowns, end.x, strict=True)]
     far = SHARE * np.array([s if u.shared else 0.0 for u, s in zip(problem.unknowns, shares, strict=True)])
-    begun, lanes = problem.evaluations, problem.count() / len(problem.tracks) * (found.x.size + 1)
+    begun, lanes = problem.evaluations, problem.count() / len(problem.tracks) * (end.x.size + 1)
     while failed < attempts[0] or (failed < attempts[1] and (problem.evaluations - begun) * lanes < CHEAP):
         sizes = [*(n * sigma for n in AWAY), far][failed % 3]
-        away = sizes * rng.choice([-1.0, 1.0], found.x.size)
-        x = np.clip(found.x + away, problem.lower, problem.upper)
-        other = _from(problem, x, found)
+        away = sizes * rng.choice([-1.0, 1.0], end.x.size)
+        x = np.clip(end.x + away, problem.lower, problem.upper)
+        other = _from(problem, x, end)
         failed += 1
-        log.tell("another valley", failed / attempts[1], min(other.normal.cost, found.normal.cost), problem)
+        log.tell("another valley", failed / attempts[1], min(other.normal.cost, end.normal.cost), problem)
         if other.interrupted:
-            return replace(found, interrupted=True)
-        if other.normal.cost < (1 - WORTH) * found.normal.cost:
+            return replace(end, interrupted=True)
+        if other.normal.cost < (1 - WORTH) * end.normal.cost:
             other = descend(problem.normal, other.x, problem.lower, problem.upper, tolerance=1e-6, here=other.normal)
             log.note("another valley", other.normal.cost, problem)
-            found, log.best, failed = other, (problem, other.x), 0
-            sigma = _errors(problem, found)
-    return found
+            end, log.best, failed = other, (problem, other.x), 0
+            sigma = _errors(problem, end)
+    return end
 
 
 LEG = 8
@@ -262,21 +262,19 @@ by how far it still is from there, within this share."""
 
 def _from(problem: Problem, x: Array, known: Descent) -> Descent:
     """Where a descent ends; given up early where it only returns to an optimum that is `known`, or ends far above."""
-    found = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG)
+    end = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG)
     for _ in range(60 // LEG):
-        cost, away = found.normal.cost, found.x - known.x
+        cost, away = end.normal.cost, end.x - known.x
         back = away @ known.normal.matrix @ away <= ARRIVED * known.normal.cost and cost >= known.normal.cost
-        if found.converged or found.interrupted or back or not cost < HOPELESS * known.normal.cost:
+        if end.converged or end.interrupted or back or not cost < HOPELESS * known.normal.cost:
             break
-        found = descend(
-            problem.normal, found.x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG, here=found.normal
-        )
-    return found
+        end = descend(problem.normal, end.x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG, here=end.normal)
+    return end
 
 
-def _errors(problem: Problem, found: Descent) -> Array:
+def _errors(problem: Problem, end: Descent) -> Array:
     """Standard errors (n,) of the coordinates, for residuals with the memory that they have."""
-    variance = np.diag(pseudo_inverse(found.normal.matrix)) * noise_level(problem, found.x) ** 2
+    variance = np.diag(pseudo_inverse(end.normal.matrix)) * noise_level(problem, end.x) ** 2
     return np.sqrt(np.maximum(variance, 0.0))
 
 
@@ -288,29 +286,29 @@ LUCK = 10.8
 """Squared residuals, of independent ones, by which a number that does nothing lowers the cost once in 1000 times."""
 
 
-def reached_limits(problem: Problem, found: Descent, log: SearchLog) -> Descent:
+def reached_limits(problem: Problem, end: Descent, log: SearchLog) -> Descent:
     """The optimum after every limit that does nothing was tried where it begins to.
 
     Beyond what a run reaches the cost is flat, so that no descent comes back from there.
     """
-    for name in () if found.interrupted else unreached(problem, found.x):
+    for name in () if end.interrupted else unreached(problem, end.x):
         place = next(i for i, u in enumerate(problem.unknowns) if u.name == name)
-        lanes = np.repeat(found.x[:, None], 40, axis=1)
+        lanes = np.repeat(end.x[:, None], 40, axis=1)
         lanes[place] = np.maximum(lanes[place] + math.log(0.85) * np.arange(40), problem.lower[place])
         costs = np.sum([_costs(problem, k, lanes) for k in range(len(problem.tracks))], axis=0)
         idle = np.flatnonzero(costs <= costs[0] * (1 + SAME))
         for share in BITES:
-            x = found.x.copy()
+            x = end.x.copy()
             x[place] = max(lanes[place, idle[-1]] + math.log(share), problem.lower[place])
             problem.settle_steps(x)
-            other = _from(problem, x, found)
+            other = _from(problem, x, end)
             if other.interrupted:
-                return replace(found, interrupted=True)
-            if other.normal.cost < found.normal.cost - LUCK * noise_level(problem, other.x) ** 2:
+                return replace(end, interrupted=True)
+            if other.normal.cost < end.normal.cost - LUCK * noise_level(problem, other.x) ** 2:
                 log.note(f"{name} reached", other.normal.cost, problem)
-                found, log.best = other, (problem, other.x)
+                end, log.best = other, (problem, other.x)
                 break
-    return found
+    return end
 
 
 MOMENTS = ("input_start", "input_end")
@@ -319,22 +317,22 @@ REACH, STEP = 0.6, 0.02
 """Seconds looked at on either side, two periods of a shaft at 3.5 Hz, and from one place to the next."""
 
 
-def other_moments(problem: Problem, found: Descent, log: SearchLog) -> Descent:
+def other_moments(problem: Problem, end: Descent, log: SearchLog) -> Descent:
     """The optimum after every sought moment was tried on a grid, the other numbers following from the best place."""
     for _ in range(3):
-        if found.interrupted:
-            return found
-        x = _moved(problem, found.x, found.normal.cost)
+        if end.interrupted:
+            return end
+        x = _moved(problem, end.x, end.normal.cost)
         if x is None:
-            return found
+            return end
         problem.settle_steps(x)
         other = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=60)
         log.note("another moment", other.normal.cost, problem)
-        if other.interrupted or not other.normal.cost < found.normal.cost:
-            return replace(found, interrupted=other.interrupted)
-        found = other
-        log.best = problem, found.x
-    return found
+        if other.interrupted or not other.normal.cost < end.normal.cost:
+            return replace(end, interrupted=other.interrupted)
+        end = other
+        log.best = problem, end.x
+    return end
 
 
 def _moved(problem: Problem, x: Array, cost: float) -> Array | None:

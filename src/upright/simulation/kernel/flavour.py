@@ -53,7 +53,7 @@ class Flavour:
     capped : bool
         What reaches the body has a limit.
     rising : bool
-        The drive brakes by how much is asked of it.
+        The drive brakes in proportion to its command.
     droop : bool
         The gain falls with the command.
     loop : Structure or Written, optional
@@ -176,6 +176,15 @@ class Layout:
         names += [f"lB{i}_{j}" for i in z for j in w if law.B[i][j] is None]
         names += [f"l{c}{i}_{j}" for c, columns in (("C", z), ("D", w)) for i in u for j in columns]
         return (*names, *(f"z{i}" for i in z), *(f"tg{i}" for i in range(self.n)))
+
+    @cached_property
+    def settings(self) -> tuple[str, ...]:
+        """Names of `rows` that stay as they are while a motion lasts: numbers of plant, drive and controller."""
+        drive = ("gain", "off", "lim", *["gd"] * self.flavour.droop, *["e", "ep", "th", "df"] * self.flavour.dynamic)
+        names = {f"{c}{j}" for c in drive for j in range(self.nu)} | {"di"} | set(self.constants)
+        law = self.flavour.loop
+        memory = {f"z{i}" for i in range(len(law.A))} if isinstance(law, Structure) else set[str]()
+        return tuple(n for n in self.rows if n in names or (n in self.numbers and n not in memory))
 
     @cached_property
     def carried(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from upright.physics.regressor import regressor
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
@@ -36,13 +37,11 @@ from upright.study.draft.tables import (
 from upright.study.rig import per
 from upright.study.text import TomlTable
 
-SI = {"mm": 1e-3, "deg": float(np.pi / 180)}
-
 REACH = 10.0
-"""Volts that ECP's converter can put out; its log shows what the program asked for."""
+"""Volts that ECP's converter can put out; its log shows what the program requested."""
 
 RESOLVED = 0.003
-"""Sample period [s] above which the braking of a drive, built up in some 30 ms, is not seen and not asked for."""
+"""Sample period [s] above which the braking of a drive, built up in some 30 ms, is neither seen nor estimated."""
 
 RESTS = 0.01
 """Share of its travel by which a body at rest may creep."""
@@ -54,7 +53,7 @@ LAGS = 0.95
 """Share of its neighbour's displacement above which dry friction may hold a body back as well as a spring."""
 
 PASSES = 0.1
-"""Share of its range that a converter's amplifier may pass when more is asked than the range; where a search begins."""
+"""Share of its range that a converter's amplifier may pass when a command exceeds the range; where a search begins."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +84,7 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[
     if start.grounded:
         doubts.append(
             f"Under a constant command the last body rests at {start.grounded:.2f} of its neighbour's place: a spring"
-            " to ground was asked for it."
+            " to ground is estimated for it."
         )
     tables = [
         _rig(record, log, plant, start),
@@ -107,7 +106,7 @@ def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
     c = log.recognised.columns[name]
     if c.guess == "counts":
         return 2 * np.pi / log.counts["rad"][0] if _unit(plant, name) == "rad" else 1 / log.counts["m"][0]
-    return SI.get(c.guess, 1.0)
+    return (ANGLES | LENGTHS).get(c.guess, 1.0)
 
 
 def _volts(c: Column) -> tuple[str, float]:
@@ -189,7 +188,7 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
     unit, scale = _volts(c)
     damping = per(force.unit, f"{_unit(plant, force.on)}/s")
     actuator = TomlTable("[actuator]")
-    why = f"{force.meaning} per command: nobody measured it, so masses, springs and friction are per that"
+    why = f"{force.meaning} per command: not measured, so masses, springs and friction are per that"
     actuator.key("gain", assumed(1, per(force.unit, unit)), why)
     braked = {"guess": with_unit(start.braked, damping), "min": 0}
     actuator.key("damping", braked, "of the drive while commanded", off=not start.braked)
@@ -205,10 +204,10 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
 def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
     counts, whose = log.counts[coordinate.unit]
-    told = f"{whose}; what is said in V, s and counts does not depend on it"
+    sentence = f"{whose}; what is in V, s and counts does not depend on it"
     driven = log.recognised.drive is not None
     return sensor_table(
-        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, told), driven=driven
+        coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, sentence), driven=driven
     )
 
 

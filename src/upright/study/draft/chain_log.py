@@ -13,6 +13,7 @@ from upright.errors import BadInput, UprightError
 from upright.physics import find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
 from upright.study.draft.described import COUNTS, counts_of
@@ -60,7 +61,7 @@ class ChainLog:
     reference : Column or None
         What a loop was to follow.
     loop : str
-        The law that made the command of reference and motion, as a study writes it; "" when it could not be told.
+        The law that made the command of reference and motion, as a study writes it; "" when it is not recovered.
     windows : tuple of (float, float)
         Stretches that speak about the plant [s].
     still : tuple of str
@@ -89,42 +90,44 @@ class ChainLog:
         return self.recognised.plant.startswith("tors")
 
 
-def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bool, path: str = "") -> ChainLog:
+def read_chain(
+    record: Record, inspection: Inspection, recognised: Recognised, *, named: bool, path: str = ""
+) -> ChainLog:
     """What a log shows of a chain.
 
     `named`: the plant was given and is not to be changed; `path` of the log may say what the rig is.
     """
-    columns = _bodies(record, seen, found)
-    reference = _reference(seen)
-    drive, doubts = _drive(record, found, reference)
+    columns = _bodies(record, inspection, recognised)
+    reference = _reference(inspection)
+    drive, doubts = _drive(record, recognised, reference)
     t = record.t
     first = record[columns[0].name]
-    plant = found.plant
-    told = list(found.doubts)
+    plant = recognised.plant
+    stated = list(recognised.doubts)
     u = record[drive.name] if drive is not None else np.zeros(t.size)
-    asked = record[reference.name] if reference is not None else u
-    at = int(np.argmax(asked != 0)) if asked[0] == 0 else 0
+    signal = record[reference.name] if reference is not None else u
+    at = int(np.argmax(signal != 0)) if signal[0] == 0 else 0
     reversed_ = drive is not None and not follows(t, u, first, at)
     if not named:
         kind, why = chain_kind(record, columns, drive, reversed_, path)
         plant = f"{kind}-{len(columns)}"
         other = "torsional" if kind == "rectilinear" else "rectilinear"
-        told = [told[0].partition(";")[0].replace("rectilinear", kind).replace("torsional", kind)] if told else []
-        told = [d.removesuffix(".") + f", since {why}; otherwise --plant {other}-{len(columns)}." for d in told]
+        stated = [stated[0].partition(";")[0].replace("rectilinear", kind).replace("torsional", kind)] if stated else []
+        stated = [d.removesuffix(".") + f", since {why}; otherwise --plant {other}-{len(columns)}." for d in stated]
     names = [c.name for c in find(plant).coordinates]
     if len(names) != len(columns):
         raise BadInput(
             f"{plant} has {len(names)} bodies, and {len(columns)} column{'s' * (len(columns) != 1)} of this log may"
             f" measure one ({', '.join(c.name for c in columns)}); choose another --plant, or write the study by hand"
         )
-    windows, loop = [_driven(record, seen, at, disks=plant.startswith("tors"))], ""
+    windows, loop = [_driven(record, inspection, at, disks=plant.startswith("tors"))], ""
     if drive is None:
         places = [record[c.name] for c in columns]
-        windows = free_stretches(t, places) or releases(t, widest(record, columns)) or [found.window]
+        windows = free_stretches(t, places) or releases(t, widest(record, columns)) or [recognised.window]
     elif reference is not None:
         loop, about_law = _law(record, drive, reference, columns[0], names[0])
         doubts.append(about_law)
-        back, begin = int(np.flatnonzero(np.diff(asked))[-1]) + 1, max(at - int(1.0 / record.period), 0)
+        back, begin = int(np.flatnonzero(np.diff(signal))[-1]) + 1, max(at - int(1.0 / record.period), 0)
         if back > at and goes_dead(t[begin:], u[begin:], first[begin:], back - begin):
             windows = [(windows[0][0], float(t[back - 1]))]
             doubts.append(
@@ -139,32 +142,32 @@ def read_chain(record: Record, seen: Inspection, found: Recognised, *, named: bo
     rest = {
         n: zero_at(record, c, windows[0], at, driven=drive is not None) for n, c in zip(names, columns, strict=True)
     }
-    found = replace(
-        found, plant=plant, columns=dict(zip(names, columns, strict=True)), rest=rest, drive=drive,
-        reversed=reversed_, mirrored=False, window=windows[0], doubts=(*told, *doubts),
+    recognised = replace(
+        recognised, plant=plant, columns=dict(zip(names, columns, strict=True)), rest=rest, drive=drive,
+        reversed=reversed_, mirrored=False, window=windows[0], doubts=(*stated, *doubts),
     )  # fmt: skip
     return ChainLog(
-        recognised=found, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),
-        still=still_bodies(record, found.columns, at) if drive is not None else (),
-        counts={unit: counts_of(seen, unit) for unit in COUNTS},
+        recognised=recognised, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),
+        still=still_bodies(record, recognised.columns, at) if drive is not None else (),
+        counts={unit: counts_of(inspection, unit) for unit in COUNTS},
     )  # fmt: skip
 
 
-def _bodies(record: Record, seen: Inspection, found: Recognised) -> list[Column]:
+def _bodies(record: Record, inspection: Inspection, recognised: Recognised) -> list[Column]:
     """Columns of the bodies in the order of the log, those that do not move included."""
-    taken = {c.name: c for c in found.columns.values()}
-    kinds = {c.guess for c in taken.values()}
+    bodies = {c.name: c for c in recognised.columns.values()}
+    kinds = {c.guess for c in bodies.values()}
     unit = next(iter(kinds))
     still = {
         c.name: replace(c, guess=unit)
-        for c in seen.columns
-        if c.name not in taken and not c.drive and (c.guess in kinds or (c.constant and not c.guess))
+        for c in inspection.columns
+        if c.name not in bodies and not c.drive and (c.guess in kinds or (c.constant and not c.guess))
         and not any(lie.startswith("the same as") for lie in c.lies)
-        and not (c.constant and c.low == 0 and len(taken) > 1)  # a board has more inputs than the rig has encoders
+        and not (c.constant and c.low == 0 and len(bodies) > 1)  # a board has more inputs than the rig has encoders
         and re.search(r"enc|pos|dis[ck]|cart|^(x|theta)_?\d", c.name, re.IGNORECASE)
     }  # fmt: skip
-    both = {**taken, **still}
-    return [both[c.name] for c in seen.columns if c.name in both][:9]
+    both = {**bodies, **still}
+    return [both[c.name] for c in inspection.columns if c.name in both][:9]
 
 
 def widest(record: Record, columns: list[Column]) -> Array:
@@ -184,9 +187,9 @@ def chain_kind(
     pushed = last * float(most[-1] - most[0]) * (-1 if against else 1) > 0
     released = drive is not None and not pushed  # driven, and nothing holds them at the end
     units = {c.guess for c in columns}
-    if units & {"rad", "deg"}:
+    if units & ANGLES.keys():
         return "torsional", "they are angles"
-    if units & {"m", "mm"}:
+    if units & LENGTHS.keys():
         return "rectilinear", "they are lengths"
     if float(np.ptp(most)) > RUNS_AWAY:
         return "torsional", f"{np.ptp(most):.0f} counts are more than a cart can travel"
@@ -206,9 +209,9 @@ def chain_kind(
     return "rectilinear", "they return to where they began"
 
 
-def _reference(seen: Inspection) -> Column | None:
+def _reference(inspection: Inspection) -> Column | None:
     """What a loop was to follow: a stepping column that is called so or is seen to be one."""
-    for c in seen.columns:
+    for c in inspection.columns:
         lies = " ".join(c.lies)
         steps_ = c.drive and c.stepwise and not c.constant and not re.search("follows|DAC|same as", lies)
         if steps_ and ("the reference" in lies or REFERENCE.search(c.name)):
@@ -216,9 +219,9 @@ def _reference(seen: Inspection) -> Column | None:
     return None
 
 
-def _drive(record: Record, found: Recognised, reference: Column | None) -> tuple[Column | None, list[str]]:
+def _drive(record: Record, recognised: Recognised, reference: Column | None) -> tuple[Column | None, list[str]]:
     """What drove the bodies, and what was doubtful about it."""
-    drive = found.drive
+    drive = recognised.drive
     if drive is None or in_dac_counts(drive):
         if reference is not None and drive is None:
             return None, [
@@ -234,12 +237,12 @@ def _drive(record: Record, found: Recognised, reference: Column | None) -> tuple
     return drive, []
 
 
-def _driven(record: Record, seen: Inspection, at: int, *, disks: bool) -> tuple[float, float]:
+def _driven(record: Record, inspection: Inspection, at: int, *, disks: bool) -> tuple[float, float]:
     """From just before the first command to where everything lies still at the end."""
     t = record.t
     start = float(t[max(at - int(0.05 / record.period) - 1, 0)])
     end = float(t[-1])
-    last = next((s for s in reversed(seen.rests) if s[1] >= end - 0.05 * (end - float(t[0]))), None)
+    last = next((s for s in reversed(inspection.rests) if s[1] >= end - 0.05 * (end - float(t[0]))), None)
     # where springs leave a cart tells its friction, so its rest stays in; where a disk stopped says no more
     if disks and last is not None and last[0] > start + 0.1 * (end - float(t[0])):
         return start, min(end, last[0] + 0.5)

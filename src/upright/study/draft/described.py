@@ -11,6 +11,7 @@ from upright.physics import find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Array, Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.recognise import Recognised, in_dac_counts
 from upright.study.text import TomlTable
 from upright.units import scale
@@ -21,47 +22,50 @@ ECP_COUNTS = {"rad": (16000, "ECP 205 has 16000"), "m": (226629, "ECP 210 has 16
 """The same of ECP's rigs, for logs that are theirs."""
 
 
-def is_ecp(seen: Inspection) -> bool:
+def is_ecp(inspection: Inspection) -> bool:
     """Whether the log itself shows that it is of an ECP rig: its export, or commands in counts of its converter."""
-    return seen.reader == "ecp" or any(in_dac_counts(c) for c in seen.columns)
+    return inspection.reader == "ecp" or any(in_dac_counts(c) for c in inspection.columns)
 
 
-def counts_of(seen: Inspection, unit: str) -> tuple[int, str]:
+def counts_of(inspection: Inspection, unit: str) -> tuple[int, str]:
     """Counts per turn or metre to begin with, and whose they are."""
-    return (ECP_COUNTS if is_ecp(seen) else COUNTS)[unit]
+    return (ECP_COUNTS if is_ecp(inspection) else COUNTS)[unit]
 
 
-def describe(tables: Sequence[TomlTable], record: Record, seen: Inspection, found: Recognised) -> None:
+def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection, recognised: Recognised) -> None:
     """Add to [rig] and [actuator] what `upright design`, `regulate` and `swing-up` need to know.
 
     A limit is assumed where a command is cut off; what the log only hints at is commented out, so that nobody's guess
     passes for a rig's number.
     """
-    if found.drive is None:
+    if recognised.drive is None:
         return
-    plant = find(found.plant)
+    plant = find(recognised.plant)
     coordinates = {c.name: c.unit for c in plant.coordinates}
     body = plant.inputs[0].on
     named = {t.lines[0].partition("]")[0] + "]": t for t in tables if t.lines}
     rig = named["[rig]"]
-    if is_ecp(seen):
+    if is_ecp(inspection):
         vendor = "ECP 210" if coordinates[body] == "m" else "ECP 205"
-        rig.key("vendor", vendor, "the log is an ECP rig's; its data sheet says what is not said here")
+        rig.key("vendor", vendor, "the log is an ECP rig's; its data sheet has what is missing here")
     else:
         period = f"{record.period * 1e3:.4g} ms"
         rig.key("servo_period", {"value": period, "assumed": True}, "the log's; MEASURE if the controller is faster")
     rig.key(
-        "travel", _went(found, body, coordinates[body]), "MEASURE: how far it may go; here it went so far", off=True
+        "travel",
+        _went(recognised, body, coordinates[body]),
+        "MEASURE: how far it may go; here it went so far",
+        off=True,
     )
     actuator, drive = (
         next((t for t in tables if t.lines[0].startswith(f"[{n}]")), None) for n in ("actuator", "drive")
     )
     if actuator is None or drive is None or any(line.startswith("limit") for line in actuator.lines):
         return
-    said = tomllib.loads(str(drive))["drive"]
-    unit, factor = said.get("unit", ""), abs(said.get("scale", 1.0))
-    most = max(abs(found.drive.low), abs(found.drive.high)) * factor
-    if is_cut_off(record[found.drive.name], max(found.drive.low_share, found.drive.high_share)):
+    stated = tomllib.loads(str(drive))["drive"]
+    unit, factor = stated.get("unit", ""), abs(stated.get("scale", 1.0))
+    most = max(abs(recognised.drive.low), abs(recognised.drive.high)) * factor
+    if is_cut_off(record[recognised.drive.name], max(recognised.drive.low_share, recognised.drive.high_share)):
         limit = {"value": with_unit(most, unit, 12), "assumed": True}
         actuator.key("limit", limit, "the command is cut off there; MEASURE")
     else:
@@ -77,9 +81,9 @@ def is_cut_off(command: Array, share: float) -> bool:
     return share > 0 and between.any() and float(np.mean(moved[between])) > 0.5
 
 
-def _went(found: Recognised, body: str, unit: str) -> str:
+def _went(recognised: Recognised, body: str, unit: str) -> str:
     """Half of what the driven body went through, "..." where its column is in counts."""
-    c = found.columns.get(body)
-    if c is None or c.guess not in ("rad", "deg", "m", "mm"):
+    c = recognised.columns.get(body)
+    if c is None or c.guess not in ANGLES | LENGTHS:
         return f"... {unit}"
     return with_unit((c.high - c.low) / 2 * scale(c.guess), unit)

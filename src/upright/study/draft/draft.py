@@ -28,7 +28,7 @@ from upright.study.windows import window_sentence
 CHAINS = ("rectilinear", "torsional")
 
 
-def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: str = "") -> str:
+def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, plant: str = "") -> str:
     """Text of a study of one log.
 
     Parameters
@@ -46,19 +46,19 @@ def draft(record: Record, seen: Inspection, log: Path, study: Path, *, plant: st
         When nothing moves, or the clock cannot be in seconds.
     """
     check_clock(record)
-    found = recognise(record, seen, plant)
+    recognised = recognise(record, inspection, plant)
     file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
-    if found.plant.startswith(CHAINS):
+    if recognised.plant.startswith(CHAINS):
         where = "/".join(log.resolve().parts[-3:])
-        chain = read_chain(record, seen, found, named=bool(plant), path=where)
-        found, tables = chain_tables(record, chain, file, log.stem)
+        chain = read_chain(record, inspection, recognised, named=bool(plant), path=where)
+        recognised, tables = chain_tables(record, chain, file, log.stem)
     else:
-        found, tables = pendulum_tables(record, seen, found, file, log.stem)
-    describe(tables, record, seen, found)
+        recognised, tables = pendulum_tables(record, inspection, recognised, file, log.stem)
+    describe(tables, record, inspection, recognised)
     if not plant:
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
-        rig.key("guessed", True, "nobody named the plant: take this out once you know it is this one")
-    doubts = [*found.doubts, *([] if plant else alike(record, seen, found))]
+        rig.key("guessed", True, "the plant was not specified: take this out once you know it is this one")
+    doubts = [*recognised.doubts, *([] if plant else alike(record, inspection, recognised))]
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
@@ -77,33 +77,37 @@ def window_of(tables: Sequence[TomlTable], record: Record) -> str:
     return window_sentence([(r["role"], *r["window"]) for r in runs], float(record.t[0]), float(record.t[-1]))
 
 
-def alike(record: Record, seen: Inspection, found: Recognised) -> list[str]:
-    """Sentence on the other plants that the columns could be of, and what each explains where it can be told.
+def alike(record: Record, inspection: Inspection, recognised: Recognised) -> list[str]:
+    """Sentence on the other plants that the columns could be of, and what each explains where it is known.
 
     Counts of an unknown encoder do not tell: a pendulum's angle has to be an angle. Carts from disks they never tell,
     and what was recognised says so already.
     """
-    counted = any(c.guess in COUNTED for c in found.columns.values())
-    others = [n for n in plants_that_suit(record, seen) if n != found.plant and n not in " ".join(found.doubts)]
-    if not others or (counted and found.plant.startswith(CHAINS) and len(found.columns) > 1):
+    counted = any(c.guess in COUNTED for c in recognised.columns.values())
+    others = [
+        n
+        for n in plants_that_suit(record, inspection)
+        if n != recognised.plant and n not in " ".join(recognised.doubts)
+    ]
+    if not others or (counted and recognised.plant.startswith(CHAINS) and len(recognised.columns) > 1):
         return []
-    taken = f"Taken for {found.plant}"
-    by_columns = [f"{taken}; the columns could be of {' or '.join(others)}: --plant says which."]
+    head = f"Taken for {recognised.plant}"
+    by_columns = [f"{head}; the columns could be of {' or '.join(others)}: --plant says which."]
     if counted:
         return by_columns
     if record.t.size > LONGEST:
-        first = min(int(np.searchsorted(record.t, found.window[0])), record.t.size - LONGEST)
+        first = min(int(np.searchsorted(record.t, recognised.window[0])), record.t.size - LONGEST)
         record = record.window(record.t[first], record.t[first + LONGEST - 1])
-        seen = inspect(record)
+        inspection = inspect(record)
     log, drafts = Path("log.csv"), dict[str, str]()
-    for name in (found.plant, *others):
+    for name in (recognised.plant, *others):
         with suppress(BadInput):  # it is not tried then, and said so
-            drafts[name] = draft(record, seen, log, log.with_suffix(".toml"), plant=name)
+            drafts[name] = draft(record, inspection, log, log.with_suffix(".toml"), plant=name)
     shares = explained(record, drafts, log.name)
-    if found.plant not in shares:
+    if recognised.plant not in shares:
         return by_columns
-    own, best = shares[found.plant], next(iter(shares))
-    told = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in others)
+    own, best = shares[recognised.plant], next(iter(shares))
+    shares_text = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in others)
     better = own < 1 - DOUBTFUL and 1 - shares[best] < CLEAR * (1 - own)
     remedy = f"--plant {best} drafts what explains them far better" if better else "--plant says which"
-    return [f"{taken} by its columns. Of the accelerations it explains {100 * own:.0f} %, {told}: {remedy}."]
+    return [f"{head} by its columns. Of the accelerations it explains {100 * own:.0f} %, {shares_text}: {remedy}."]

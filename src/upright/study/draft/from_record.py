@@ -1,4 +1,4 @@
-"""A study of a record at hand, with what its owner knows and asks in the place of what a draft guesses."""
+"""A study of a record: a draft, with the caller's known and estimated numbers in place of its guesses."""
 
 from __future__ import annotations
 
@@ -138,14 +138,14 @@ def _answer(
     values: dict[str, Any], actuator: dict[str, Any], plant: type[Plant], known: Mapping[str, Number],
     ask: Sequence[str] | Mapping[str, Number] | None,
 ) -> None:  # fmt: skip
-    """Put what is known and asked in the place of what the draft guessed."""
+    """Replace guesses of a draft by what is known and estimated."""
     names = (*plant.names(), *ACTUATOR)
-    asked = [] if ask is None else list(ask)
-    for name in (*known, *asked):
+    estimated = [] if ask is None else list(ask)
+    for name in (*known, *estimated):
         if name not in names:
             raise BadInput(f"{plant.__name__} has no number '{name}'; {nearest(name, names)}")
-        if name in known and name in asked:
-            raise BadInput(f"'{name}' cannot be known and asked at once; leave it out of one.")
+        if name in known and name in estimated:
+            raise BadInput(f"'{name}' cannot be known and estimated at once; leave it out of one.")
 
     def table(name: str) -> tuple[dict[str, Any], str]:
         return (actuator, name.partition(".")[2]) if name in ACTUATOR else (values, name)
@@ -155,7 +155,7 @@ def _answer(
     for name, value in known.items():
         where, key = table(name)
         where[key] = _text(value, plant, name)
-    starts = {n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or _guess(values, plant, n) for n in asked}
+    starts = {n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or _guess(values, plant, n) for n in estimated}
     for name in guesses if ask is not None else ():
         where, key = table(name)
         if name not in known:
@@ -167,7 +167,7 @@ def _answer(
     missing = [n for n in plant.names() if n not in values and n not in defaults]
     if missing:
         raise BadInput(
-            f"{plant.__name__} needs {', '.join(missing)}, neither known nor asked; measure and pass"
+            f"{plant.__name__} needs {', '.join(missing)}, neither known nor estimated; measure and pass"
             f' known={{"{missing[0]}": ...}}, or ask for it with a guess.'
         )
 
@@ -198,7 +198,9 @@ def _guess(values: Mapping[str, Any], plant: type[Plant], name: str) -> Number:
     other = name.replace("_1", "_2", 1)
     if name.startswith("b_1") and other in names and number(other) > 0:
         return number(other)
-    raise BadInput(f'{name} is asked and no guess of it can be read from the log; pass ask={{"{name}": "..."}}.')
+    raise BadInput(
+        f'{name} is to be estimated and no guess of it can be read from the log; pass ask={{"{name}": "..."}}.'
+    )
 
 
 def _lines(study: Mapping[str, Any]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Draft of a study of pendulums and of plants of the user's own: which numbers are assumed, which are asked.
+"""Draft of a study of pendulums and of plants of the user's own: which numbers are assumed, which are estimated.
 
 Nothing is known that nobody measured: a placeholder is assumed, so that the fit says what rests on it.
 
@@ -19,6 +19,7 @@ from upright.physics import Plant, find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
@@ -91,41 +92,41 @@ class Balanced:
 
 @dataclass(frozen=True, kw_only=True)
 class PendulumStarts:
-    """Numbers of a plant in SI: `assumed` with the reason, `asked` from a guess on, `uncertain` with how much [%]."""
+    """Numbers of a plant in SI: `assumed` with the reason, `guesses` to estimate, `uncertain` with how much [%]."""
 
     assumed: Mapping[str, tuple[float, str]]
-    asked: Mapping[str, float]
+    guesses: Mapping[str, float]
     uncertain: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
 
 
 def pendulum_tables(
-    record: Record, seen: Inspection, found: Recognised, file: str, label: str
+    record: Record, inspection: Inspection, recognised: Recognised, file: str, label: str
 ) -> tuple[Recognised, list[TomlTable]]:
     """What is recognised in the end, and the tables of a study about it."""
-    plant = find(found.plant)
-    balanced = balance_of(record, found)
+    plant = find(recognised.plant)
+    balanced = balance_of(record, recognised)
     if balanced:
-        found = recognised_upright(found, balanced)
-    starts = starts_upright(balanced, found.plant) if balanced else starts_hanging(found, plant)
-    told = implausible(plant, {**{n: v for n, (v, _) in starts.assumed.items()}, **starts.asked}, scaled_by="")
-    found = replace(found, doubts=(*found.doubts, *told))
-    tables = [_rig(record, found, plant), _parameters(plant, starts), *_drive(found, plant, balanced)]
-    tables += [_sensor(seen, found, plant, name) for name in found.columns]
-    return found, [*tables, _defaults(found, plant, balanced), *_runs(found, file, label)]
+        recognised = recognised_upright(recognised, balanced)
+    starts = starts_upright(balanced, recognised.plant) if balanced else starts_hanging(recognised, plant)
+    remarks = implausible(plant, {**{n: v for n, (v, _) in starts.assumed.items()}, **starts.guesses}, scaled_by="")
+    recognised = replace(recognised, doubts=(*recognised.doubts, *remarks))
+    tables = [_rig(record, recognised, plant), _parameters(plant, starts), *_drive(recognised, plant, balanced)]
+    tables += [_sensor(inspection, recognised, plant, name) for name in recognised.columns]
+    return recognised, [*tables, _defaults(recognised, plant, balanced), *_runs(recognised, file, label)]
 
 
-def balance_of(record: Record, found: Recognised) -> Balanced | None:
+def balance_of(record: Record, recognised: Recognised) -> Balanced | None:
     """How a pendulum is balanced, None when it hangs, or swings, or nothing works to keep it up."""
-    if found.plant not in ("cart-pendulum", "furuta") or found.drive is None or len(found.columns) < 2:
+    if recognised.plant not in ("cart-pendulum", "furuta") or recognised.drive is None or len(recognised.columns) < 2:
         return None
-    first, last = (record[c.name] * _si(c.guess) for c in found.columns.values())
-    u = command_unit(found.drive)[1] * record[found.drive.name]
+    first, last = (record[c.name] * _si(c.guess) for c in recognised.columns.values())
+    u = command_unit(recognised.drive)[1] * record[recognised.drive.name]
     centre = float(np.median(last))
     tilt = last - centre
     if np.abs(tilt).max() > SMALL or np.mean(np.abs(u) > 1e-3 * np.abs(u).max()) < BUSY:
         return None
     dt = float(record.t[-1] - record.t[0]) / (record.t.size - 1)
-    steps = [(c.resolution.step or 0.0) * _si(c.guess) for c in found.columns.values()]
+    steps = [(c.resolution.step or 0.0) * _si(c.guess) for c in recognised.columns.values()]
     wide = max(acceleration_width(x, dt, step) for x, step in zip((first, tilt), steps, strict=True))
     width = max(7, int(min(max(wide, SMOOTHED[0] / dt), SMOOTHED[1] / dt)) | 1)
     if record.t.size < 30 * width:
@@ -133,7 +134,7 @@ def balance_of(record: Record, found: Recognised) -> Balanced | None:
     motion = smoothed([first, math.pi + tilt], dt, width)
     push = savitzky_golay(u, dt, width).q
     inside = slice(width, -width)
-    hinge = hinge_of(find(found.plant), motion, inside)
+    hinge = hinge_of(find(recognised.plant), motion, inside)
     if hinge.gravity <= 0 or hinge.left > 0.9 * hinge.weightless:
         return None
     # close to upright all that the pendulum does to the first coordinate goes with its angle
@@ -143,54 +144,54 @@ def balance_of(record: Record, found: Recognised) -> Balanced | None:
     return Balanced(rate=math.sqrt(hinge.gravity), throw=hinge.throw, pull=pull, centre=centre)
 
 
-def recognised_upright(found: Recognised, balanced: Balanced) -> Recognised:
+def recognised_upright(recognised: Recognised, balanced: Balanced) -> Recognised:
     """What was recognised, with signs and the reading of the pendulum's zero, half a turn from upright."""
     mirrored = balanced.throw < 0
-    last = list(found.columns)[-1]
-    scale = _si(found.columns[last].guess)
+    last = list(recognised.columns)[-1]
+    scale = _si(recognised.columns[last].guess)
     zero = (balanced.centre + (math.pi if mirrored else -math.pi)) / scale
     return replace(
-        found, reversed=balanced.pull < 0, mirrored=mirrored, rest={**found.rest, last: zero},
-        window=found.window, frequency=balanced.rate,
-        doubts=(*found.doubts, "The pendulum falls away from where it is kept: it was taken for balanced upright, and"
-                " is predicted 50 and 200 ms ahead.") ,
+        recognised, reversed=balanced.pull < 0, mirrored=mirrored, rest={**recognised.rest, last: zero},
+        window=recognised.window, frequency=balanced.rate,
+        doubts=(*recognised.doubts, "The pendulum falls away from where it is kept: it was taken for balanced upright,"
+                " and is predicted 50 and 200 ms ahead.") ,
     )  # fmt: skip
 
 
 def starts_upright(balanced: Balanced, plant: str) -> PendulumStarts:
     """Numbers of a balanced pendulum on a cart or an arm."""
-    given = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
+    assumed = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
     inertia = balanced.inertia(plant)
-    asked = {"l_cg": balanced.length, "b_1": 2 * inertia, "b_1c": 0.02 * balanced.gain(plant)}
+    guesses = {"l_cg": balanced.length, "b_1": 2 * inertia, "b_1c": 0.02 * balanced.gain(plant)}
     if plant == "cart-pendulum":
-        return PendulumStarts(assumed=given | {"m_c": (inertia, "MEASURE")}, asked=asked)
-    return PendulumStarts(assumed=given, asked=asked | {"J_d": inertia / 2, "k_psi": 2 * inertia},
+        return PendulumStarts(assumed=assumed | {"m_c": (inertia, "MEASURE")}, guesses=guesses)
+    return PendulumStarts(assumed=assumed, guesses=guesses | {"J_d": inertia / 2, "k_psi": 2 * inertia},
                   uncertain={"r": (balanced.arm(), "30 %")})  # fmt: skip
 
 
-def starts_hanging(found: Recognised, plant: type[Plant]) -> PendulumStarts:
+def starts_hanging(recognised: Recognised, plant: type[Plant]) -> PendulumStarts:
     """Numbers of a pendulum that swings about where it hangs; any other plant has sizes that swing as slowly."""
-    w = found.frequency or 6.0
+    w = recognised.frequency or 6.0
     length = G / w**2
-    given = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
-    if found.plant == "pendulum":
+    assumed = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
+    if recognised.plant == "pendulum":
         friction = {"b_2": 0.002 * w * length**2, "b_2c": 0.002 * G * length, "b_2q": 0.002 * length**2}
-        return PendulumStarts(assumed=given, asked={"l_cg": length, **friction})
-    if found.plant in ("cart-pendulum", "furuta"):
-        given["m_p"] = (MASS, given["m_p"][1])
-        asked = {"l_cg": length, "b_2": 0.002 * w * MASS * length**2, "b_2c": 0.001 * G * MASS * length}
-        driven = found.drive is not None and plant.coordinates[0].name in found.columns
-        if found.plant == "cart-pendulum":
-            given["m_c"] = (1.0, "MEASURE")
+        return PendulumStarts(assumed=assumed, guesses={"l_cg": length, **friction})
+    if recognised.plant in ("cart-pendulum", "furuta"):
+        assumed["m_p"] = (MASS, assumed["m_p"][1])
+        guesses = {"l_cg": length, "b_2": 0.002 * w * MASS * length**2, "b_2c": 0.001 * G * MASS * length}
+        driven = recognised.drive is not None and plant.coordinates[0].name in recognised.columns
+        if recognised.plant == "cart-pendulum":
+            assumed["m_c"] = (1.0, "MEASURE")
         else:
-            given["r"] = (0.1, "MEASURE")
+            assumed["r"] = (0.1, "MEASURE")
             if driven:
-                asked["J_d"] = 1e-3
+                guesses["J_d"] = 1e-3
             else:
-                given["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
+                assumed["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
         if driven:
-            asked |= {"b_1": INERTIA[found.plant] * 1.0, "b_1c": INERTIA[found.plant] * 0.1}
-        return PendulumStarts(assumed=given, asked=asked)
+            guesses |= {"b_1": INERTIA[recognised.plant] * 1.0, "b_1c": INERTIA[recognised.plant] * 0.1}
+        return PendulumStarts(assumed=assumed, guesses=guesses)
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
     sizes = {"m": length, "kg m^2": length**2, "N m/rad": (w * length) ** 2}
     viscous = {"N m s/rad": 0.002 * w * length**2, "N s/m": 0.002 * w}
@@ -198,7 +199,7 @@ def starts_hanging(found: Recognised, plant: type[Plant]) -> PendulumStarts:
     rubbed |= {j.coulomb: 0.002 * G * length for j in plant.joints if j.coulomb}
     return PendulumStarts(
         assumed=dict.fromkeys(required[:1], (1.0, "MEASURE")),
-        asked={n: sizes.get(plant.quantity(n).unit, 1.0) for n in required[1:]} | rubbed,
+        guesses={n: sizes.get(plant.quantity(n).unit, 1.0) for n in required[1:]} | rubbed,
     )
 
 
@@ -206,11 +207,11 @@ INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
 """What the drive moves, where the search begins [kg m^2, kg]."""
 
 
-def _rig(record: Record, found: Recognised, plant: type[Plant]) -> TomlTable:
+def _rig(record: Record, recognised: Recognised, plant: type[Plant]) -> TomlTable:
     period = 0.0
-    if (found.window[1] - found.window[0]) / record.period > MANY and found.frequency:
-        period = max(1, int(2 * np.pi / found.frequency / 200 / record.period)) * record.period
-    return rig_toml(found.plant, plant, record, period)
+    if (recognised.window[1] - recognised.window[0]) / record.period > MANY and recognised.frequency:
+        period = max(1, int(2 * np.pi / recognised.frequency / 200 / record.period)) * record.period
+    return rig_toml(recognised.plant, plant, record, period)
 
 
 def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
@@ -224,20 +225,20 @@ def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
         elif name in starts.uncertain:
             value, percent = starts.uncertain[name]
             table.key(name, {"value": with_unit(value, what.unit), "uncertainty": percent}, f"{what.meaning}; MEASURE")
-        elif name in starts.asked:
-            table.key(name, {"guess": with_unit(starts.asked[name], what.unit)}, what.meaning)
+        elif name in starts.guesses:
+            table.key(name, {"guess": with_unit(starts.guesses[name], what.unit)}, what.meaning)
         elif name != "g":
             left.append(name)
     parameters_left_at_zero(table, plant, left)
     return table
 
 
-def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> list[TomlTable]:
-    if found.drive is None or not plant.inputs:
+def _drive(recognised: Recognised, plant: type[Plant], balanced: Balanced | None) -> list[TomlTable]:
+    if recognised.drive is None or not plant.inputs:
         return [no_drive_table()] if plant.inputs else []
-    unit, scale = command_unit(found.drive)
-    force, driven = plant.inputs[0], next(iter(found.columns))
-    guess = balanced.gain(found.plant) if balanced else _gain(found)
+    unit, scale = command_unit(recognised.drive)
+    force, driven = plant.inputs[0], next(iter(recognised.columns))
+    guess = balanced.gain(recognised.plant) if balanced else _gain(recognised)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
     actuator = TomlTable("[actuator]")
     gain = {"guess": with_unit(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
@@ -247,41 +248,41 @@ def _drive(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> 
     actuator.key("slope", {"guess": with_unit(0, per(force.unit, speed))}, "force lost per speed", off=True)
     actuator.key("lag", {"guess": "5 ms", "max": "0.1 s"}, off=True)
     actuator.key("delay", {"guess": "1 ms", "max": "10 ms"}, off=balanced is None)
-    return [drive_table(found.drive, unit, scale, reversed_=found.reversed), actuator]
+    return [drive_table(recognised.drive, unit, scale, reversed_=recognised.reversed), actuator]
 
 
-def _gain(found: Recognised) -> float:
+def _gain(recognised: Recognised) -> float:
     """Force per command of the right size: what the start inertia needs to swing as far as was seen."""
-    assert found.drive is not None
-    c = next(iter(found.columns.values()))
-    swing = (c.high - c.low) / 2 * {"counts": 4e-4, "mm": 1e-3, "deg": math.pi / 180}.get(c.guess, 1.0)
-    u = max(abs(found.drive.low), abs(found.drive.high)) or 1.0
-    u *= command_unit(found.drive)[1]
-    w = found.frequency or 6.0
-    inertia = INERTIA.get(found.plant, (G / w**2) ** 2)  # of the 1 kg that is assumed
+    assert recognised.drive is not None
+    c = next(iter(recognised.columns.values()))
+    swing = (c.high - c.low) / 2 * {"counts": 4e-4, **ANGLES, **LENGTHS}.get(c.guess, 1.0)
+    u = max(abs(recognised.drive.low), abs(recognised.drive.high)) or 1.0
+    u *= command_unit(recognised.drive)[1]
+    w = recognised.frequency or 6.0
+    inertia = INERTIA.get(recognised.plant, (G / w**2) ** 2)  # of the 1 kg that is assumed
     return max(inertia * swing * w**2 / u, 1e-9)
 
 
-def _sensor(seen: Inspection, found: Recognised, plant: type[Plant], name: str) -> TomlTable:
-    c = found.columns[name]
+def _sensor(inspection: Inspection, recognised: Recognised, plant: type[Plant], name: str) -> TomlTable:
+    c = recognised.columns[name]
     coordinate = next(k for k in plant.coordinates if k.name == name)
-    mirrored = found.mirrored and name == plant.coordinates[-1].name
+    mirrored = recognised.mirrored and name == plant.coordinates[-1].name
     return sensor_table(
         coordinate,
         c,
-        found.rest[name],
-        counts_of(seen, coordinate.unit),
-        driven=found.drive is not None,
+        recognised.rest[name],
+        counts_of(inspection, coordinate.unit),
+        driven=recognised.drive is not None,
         mirrored=mirrored,
     )
 
 
-def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) -> TomlTable:
+def _defaults(recognised: Recognised, plant: type[Plant], balanced: Balanced | None) -> TomlTable:
     table = TomlTable("[defaults]")
-    missing = [c.name for c in plant.coordinates if c.name not in found.columns]
+    missing = [c.name for c in plant.coordinates if c.name not in recognised.columns]
     if missing:
         table.key("locked", missing, "no column was found; give them a sensor if they move")
-    if found.drive is None and not missing and found.plant in ("cart-pendulum", "furuta"):
+    if recognised.drive is None and not missing and recognised.plant in ("cart-pendulum", "furuta"):
         why = "its measured motion is prescribed, since no column says what drove it"
         table.key("held", [plant.coordinates[0].name], why)
     if balanced:
@@ -289,22 +290,22 @@ def _defaults(found: Recognised, plant: type[Plant], balanced: Balanced | None) 
         unknown = [f"offset.{plant.coordinates[-1].name}", "input_offset"]
         table.key("unknown", unknown, "where the counter was zeroed; what leans on the first body")
     else:
-        unknown = ["initial"] if found.drive is not None and found.settled else ["initial", "offset"]
+        unknown = ["initial"] if recognised.drive is not None and recognised.settled else ["initial", "offset"]
         table.key("unknown", unknown, "estimated for each run alone")
     return table
 
 
-def _runs(found: Recognised, file: str, label: str) -> list[TomlTable]:
+def _runs(recognised: Recognised, file: str, label: str) -> list[TomlTable]:
     """One run; a long free swing keeps its tail for prediction, and of several the last one is predicted."""
-    start, stop = found.window
-    if found.earlier:
-        runs = [(f"{label} {i + 1}", a, b, "fit") for i, (a, b) in enumerate(found.earlier)]
+    start, stop = recognised.window
+    if recognised.earlier:
+        runs = [(f"{label} {i + 1}", a, b, "fit") for i, (a, b) in enumerate(recognised.earlier)]
         return run_tables(file, [*runs, (f"{label} {len(runs) + 1}", start, stop, "predict")])
     split = start + 0.6 * (stop - start)
-    if found.drive is None and found.frequency * (stop - start) / (2 * np.pi) > 12:
+    if recognised.drive is None and recognised.frequency * (stop - start) / (2 * np.pi) > 12:
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
     return run_tables(file, [(label, start, stop, "fit")])
 
 
 def _si(unit: str) -> float:
-    return {"deg": math.pi / 180, "mm": 1e-3, "counts": 2 * math.pi / 4096}.get(unit, 1.0)
+    return {"counts": 2 * math.pi / 4096, **ANGLES, **LENGTHS}.get(unit, 1.0)

@@ -1,4 +1,4 @@
-"""What a log shows before anybody has said what the rig is: plant, columns, stretches, rest levels, period."""
+"""What a log shows without a description of the rig: plant, columns, stretches, rest levels, period."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from upright.errors import BadInput
 from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
-from upright.records.columns import bare_name
+from upright.records.columns import ANGLES, LENGTHS, bare_name
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
@@ -22,7 +22,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
-_SI = {"deg": math.pi / 180, "mm": 1e-3}
+_SI = ANGLES | LENGTHS
 _COORDINATES = ("psi", "theta", "x")
 """Of the rigs that carry a pendulum."""
 _DISK = re.compile(r"disk|disc|theta\s*_?[123]\b", re.IGNORECASE)
@@ -71,37 +71,37 @@ class Recognised:
     earlier: tuple[tuple[float, float], ...] = ()
 
 
-def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
-    """What can be told from a record and its inspection; `plant` overrides the guess.
+def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recognised:
+    """What is recognised in a record and its inspection; `plant` overrides the guess.
 
     Raises
     ------
     BadInput
         When nothing in the log moves.
     """
-    found = position_columns(record, seen)
-    if not found:
+    positions = position_columns(record, inspection)
+    if not positions:
         raise BadInput(
-            f"{seen.file}: no column moves like an angle, a position or a count; `upright show` lists what there is"
+            f"{inspection.file}: no column moves like an angle, a position or a count; `upright show` lists all"
         )
-    drive = drive_column(record, seen)
+    drive = drive_column(record, inspection)
     doubts: list[str] = []
     if not plant:
-        plant, doubt = plant_of(found, drive)
+        plant, doubt = plant_of(positions, drive)
         doubts += [doubt] if doubt else []
-    columns, missing = _assign(find(plant), found)
+    columns, missing = _assign(find(plant), positions)
     degrees = [c.name for c in columns.values() if c.guess == "deg" and not c.unit]
     doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
     last = record[list(columns.values())[-1].name]
     pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
-    window = moving_window(record, seen, [record[c.name] for c in columns.values()], drive, pushed=pushed)
+    window = moving_window(record, inspection, [record[c.name] for c in columns.values()], drive, pushed=pushed)
     inside = (record.t >= window[0]) & (record.t <= window[1])
-    rest = {n: zero_reading(record, seen, c, drive, window, hangs=n == "theta") for n, c in columns.items()}
+    rest = {n: zero_reading(record, inspection, c, drive, window, hangs=n == "theta") for n, c in columns.items()}
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
     earlier: tuple[tuple[float, float], ...] = ()
-    turned = {"rad": 1.0, "deg": math.pi / 180}.get(columns[list(columns)[-1]].guess, 0.0)
+    turned = ANGLES.get(columns[list(columns)[-1]].guess, 0.0)
     if drive is None and turned and list(columns)[-1] == "theta":
         angle = turned * (last - centre)
         small = swing_frequency(record.t[inside], angle[inside])
@@ -113,7 +113,7 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
             window, earlier = swings[-1], tuple(swings[:-1])
         inside = (record.t >= window[0]) & (record.t <= window[1])
     mirrored = False
-    if pushed and all(c.guess in ("rad", "deg") or name == "x" for name, c in columns.items()):
+    if pushed and all(c.guess in ANGLES or name == "x" for name, c in columns.items()):
         first, hanging = (_SI.get(c.guess, 1.0) for c in columns.values())
         angle = hanging * (last[inside] - centre)
         mirrored = coupling(find(plant), record.t[inside], first * driven[inside], angle) < 0
@@ -126,34 +126,36 @@ def recognise(record: Record, seen: Inspection, plant: str = "") -> Recognised:
         mirrored=mirrored,
         window=window,
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
-        settled=bool(seen.rests) or (drive is not None and _starts_still(last, record[drive.name])),
+        settled=bool(inspection.rests) or (drive is not None and _starts_still(last, record[drive.name])),
         doubts=tuple(doubts),
         earlier=earlier,
     )
 
 
-def position_columns(record: Record, seen: Inspection) -> list[Column]:
+def position_columns(record: Record, inspection: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
-    kinds = ("rad", "m", "counts", "deg", "mm", "")
-    places = [c for c in seen.columns if not c.drive and c.name not in record.inputs and c.guess in kinds]
-    found = [c for c in places if not (c.constant or _lies(c, seen))]
-    found = [c for c in found if not RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in found])]
-    found = [_in_degrees(record, _as_angle(record, c, seen)) for c in found]
-    found = [c for c in found if c.guess] or found
-    span = {c.name: c.high - c.low for c in found}
-    largest = {unit: max(span[c.name] for c in found if c.guess == unit) for unit in {c.guess for c in found}}
+    kinds = (*ANGLES, *LENGTHS, "counts", "")
+    places = [c for c in inspection.columns if not c.drive and c.name not in record.inputs and c.guess in kinds]
+    columns = [c for c in places if not (c.constant or _lies(c, inspection))]
+    columns = [
+        c for c in columns if not RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in columns])
+    ]
+    columns = [_in_degrees(record, _as_angle(record, c, inspection)) for c in columns]
+    columns = [c for c in columns if c.guess] or columns
+    span = {c.name: c.high - c.low for c in columns}
+    largest = {unit: max(span[c.name] for c in columns if c.guess == unit) for unit in {c.guess for c in columns}}
     # a locked arm still moves by some mrad; counts of a cart's encoder and of a pendulum's are not of one size
     return [
         c
-        for c in found
+        for c in columns
         if span[c.name] > 0.01 * largest[c.guess] or (c.guess == "counts" and bare_name(c.name) in _COORDINATES)
     ]
 
 
-def _lies(c: Column, seen: Inspection) -> bool:
+def _lies(c: Column, inspection: Inspection) -> bool:
     """Whether a column is not what it is called; of two equal ones, the reference or the later one lies."""
-    names = [o.name for o in seen.columns]
-    earlier = [f"the same as '{o.name}'" for o in seen.columns[: names.index(c.name)] if not o.drive]
+    names = [o.name for o in inspection.columns]
+    earlier = [f"the same as '{o.name}'" for o in inspection.columns[: names.index(c.name)] if not o.drive]
     return any(not lie.startswith("the same as") or lie in earlier for lie in c.lies)
 
 
@@ -171,11 +173,11 @@ def _is_speed(record: Record, name: str, others: list[str]) -> bool:
     return False
 
 
-def _as_angle(record: Record, c: Column, seen: Inspection) -> Column:
+def _as_angle(record: Record, c: Column, inspection: Inspection) -> Column:
     """A nameless column that comes to rest half a turn from zero is an angle."""
     if c.guess or c.high - c.low < 0.3:
         return c
-    rest = rest_level(record[c.name], seen, record.t)
+    rest = rest_level(record[c.name], inspection, record.t)
     return replace(c, guess="rad") if abs(abs(rest) - math.pi) < 0.1 else c
 
 
@@ -197,24 +199,24 @@ def in_dac_counts(c: Column) -> bool:
     return any(lie.startswith("the command in DAC counts") for lie in c.lies)
 
 
-def drive_column(record: Record, seen: Inspection) -> Column | None:
+def drive_column(record: Record, inspection: Inspection) -> Column | None:
     """What commands the rig.
 
     That is the column in converter counts, else one called like an effort, else one that looks so; where the record
     states an input, it is that.
     """
-    dac = next((c for c in seen.columns if in_dac_counts(c)), None)
+    dac = next((c for c in inspection.columns if in_dac_counts(c)), None)
     if dac is not None:
         return dac
-    candidates = [c for c in seen.columns if c.drive and not c.constant]
+    candidates = [c for c in inspection.columns if c.drive and not c.constant]
     candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
     candidates = [c for c in candidates if not REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name) or effort_unit(c.name)]
-    found = (effort or candidates or [None])[0]
-    stated = [seen.column(name) for name in record.inputs]
-    if not stated or (found is not None and found.name in record.inputs):
-        return found
-    return found if stated[0].constant else stated[0]
+    drive = (effort or candidates or [None])[0]
+    stated = [inspection.column(name) for name in record.inputs]
+    if not stated or (drive is not None and drive.name in record.inputs):
+        return drive
+    return drive if stated[0].constant else stated[0]
 
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
@@ -222,9 +224,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     named = _by_coordinates({bare_name(c.name) for c in places})
     if named:
         return named, f"The columns are called as the coordinates of a {named}."
-    lengths = [c for c in places if c.guess in ("m", "mm")]
+    lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
-    angles = [c for c in places if c.guess in ("rad", "deg")]
+    angles = [c for c in places if c.guess in ANGLES]
     bodies = min(len(counts), 3)
     if counts and not angles and not lengths:
         kind = "torsional" if any(_DISK.search(bare_name(c.name)) for c in counts) else "rectilinear"
@@ -265,7 +267,7 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
     """Column per coordinate: by name, then by kind and order."""
     left, out, missing = list(places), dict[str, Column](), list[str]()
     for coordinate in plant.coordinates:
-        kinds = ("rad", "deg") if coordinate.unit == "rad" else ("m", "mm")
+        kinds = ANGLES if coordinate.unit == "rad" else LENGTHS
         fitting = [c for c in left if c.guess in kinds] or [c for c in left if c.guess in ("counts", "")]
         pattern = {"psi": _ARM, "x": _CART}.get(coordinate.name)
         best = next((c for c in left if bare_name(c.name) == coordinate.name), None)
@@ -282,7 +284,7 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
 
 
 def zero_reading(
-    record: Record, seen: Inspection, c: Column, drive: Column | None, window: tuple[float, float], *, hangs: bool
+    record: Record, inspection: Inspection, c: Column, drive: Column | None, window: tuple[float, float], *, hangs: bool
 ) -> float:
     """Reading at which a coordinate is taken to be zero: before the first command, else where it comes to rest.
 
@@ -293,11 +295,11 @@ def zero_reading(
         u = record[drive.name]
         first = int(np.argmax(u != u[0]))
         before = x[max(0, first - 50) : first]
-        angle = c.guess in ("rad", "deg")
+        angle = c.guess in ANGLES
         if u[0] == 0 and first >= 5 and not (hangs and not _starts_still(x, u)):
             return float(np.median(before))
-        return rest_level(x, seen, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
-    return rest_level(x, seen, record.t)
+        return rest_level(x, inspection, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
+    return rest_level(x, inspection, record.t)
 
 
 STILL = 0.05
@@ -310,21 +312,21 @@ def _starts_still(x: Array, u: Array) -> bool:
     return u[0] == 0 and first >= 5 and float(np.ptp(x[:first])) <= STILL * float(np.ptp(x))
 
 
-def rest_level(x: Array, seen: Inspection, t: Array) -> float:
+def rest_level(x: Array, inspection: Inspection, t: Array) -> float:
     """Reading at rest: where it lies still at the end, else at the start, else the middle of the last swings."""
-    for start, stop in reversed(seen.rests):
+    for start, stop in reversed(inspection.rests):
         if stop >= t[-1] - 0.05 * (t[-1] - t[0]):
             return float(np.median(x[(t >= start) & (t <= stop)]))
     late = x[-max(x.size // 5, 2) :]
     middle = (float(late.max()) + float(late.min())) / 2
-    start = next((span for span in seen.rests if span[0] <= t[0] + 0.02 * (t[-1] - t[0])), None)
+    start = next((span for span in inspection.rests if span[0] <= t[0] + 0.02 * (t[-1] - t[0])), None)
     held = float(np.median(x[(t >= start[0]) & (t <= start[1])])) if start else middle
     # lying still away from the middle is a hand that holds it before release
     return held if abs(held - middle) < 0.1 * float(np.ptp(x)) else middle
 
 
 def moving_window(
-    record: Record, seen: Inspection, signals: list[Array], drive: Column | None, *, pushed: bool
+    record: Record, inspection: Inspection, signals: list[Array], drive: Column | None, *, pushed: bool
 ) -> tuple[float, float]:
     """From shortly before the first command, or the release, to where everything has come to rest.
 
@@ -333,8 +335,8 @@ def moving_window(
     t = record.t
     start, stop = float(t[0]), float(t[-1])
     length = stop - start
-    last = next((span for span in reversed(seen.rests) if span[1] >= stop - 0.05 * length), None)
-    still = next((span for span in seen.rests if span[0] <= start + 0.02 * length), None)
+    last = next((span for span in reversed(inspection.rests) if span[1] >= stop - 0.05 * length), None)
+    still = next((span for span in inspection.rests if span[0] <= start + 0.02 * length), None)
     if drive is not None:
         if still is not None and drive.switches:
             start = max(start, drive.switches[0][0] - 0.1)
@@ -342,7 +344,7 @@ def moving_window(
         start = max(start, still[1] - 0.1) if still is not None else start
     else:
         x = signals[-1]
-        swing = np.abs(x - rest_level(x, seen, t))
+        swing = np.abs(x - rest_level(x, inspection, t))
         # a free swing only loses amplitude: it begins where it is last as large as ever
         start = float(t[np.flatnonzero(swing >= 0.95 * swing.max())[-1]])
         moving = np.flatnonzero(swing >= 0.03 * swing.max())[-1]
@@ -356,9 +358,9 @@ def moving_window(
 
 def moves_against(t: Array, u: Array, x: Array) -> bool:
     """Whether the driven column is accelerated against the command; against the first one where that does not tell."""
-    told = _pushed(t, u, x)
-    if told:
-        return told < 0
+    slope = _pushed(t, u, x)
+    if slope:
+        return slope < 0
     live = np.flatnonzero(u != u[0])
     if not live.size:
         return False
@@ -387,10 +389,10 @@ def _pushed(t: Array, u: Array, x: Array) -> float:
     slopes, *_ = np.linalg.lstsq(both, a, rcond=None)
     alone, *_ = np.linalg.lstsq(both[:, 1:], a, rcond=None)
     left, without = np.sum((a - both @ slopes) ** 2), np.sum((a - both[:, 1:] @ alone) ** 2)
-    return float(slopes[0]) if left < TOLD * without else 0.0
+    return float(slopes[0]) if left < CLEAR * without else 0.0
 
 
-TOLD = 0.9
+CLEAR = 0.9
 """What accelerations are missed by with the command, over what without, at most, for its sign to be believed."""
 
 

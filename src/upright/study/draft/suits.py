@@ -1,10 +1,11 @@
-"""Which plants a log's columns could be of, before anybody has said what the rig is."""
+"""Which plants a log's columns could be of, without a description of the rig."""
 
 from __future__ import annotations
 
 from upright.physics import PLANTS, Plant
 from upright.readers.inspection import Inspection
 from upright.records import Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.chain_log import chain_kind
 from upright.study.draft.recognise import drive_column, moves_against, plant_of, position_columns
 
@@ -14,12 +15,12 @@ COUNTED = ("counts", "")
 MOST_BODIES = 3
 
 
-def plants_that_suit(record: Record, seen: Inspection) -> tuple[str, ...]:
+def plants_that_suit(record: Record, inspection: Inspection) -> tuple[str, ...]:
     """Plants whose coordinates a log's moving columns can measure, the likeliest first; none when none can."""
-    places = position_columns(record, seen)
+    places = position_columns(record, inspection)
     if not places:
         return ()
-    drive = drive_column(record, seen)
+    drive = drive_column(record, inspection)
     likely, _ = plant_of(places, drive)
     if all(c.guess in COUNTED for c in places):
         places = places[:MOST_BODIES]
@@ -28,7 +29,7 @@ def plants_that_suit(record: Record, seen: Inspection) -> tuple[str, ...]:
         kind, _ = chain_kind(record, places, drive, against, record.provenance.file)
         likely = f"{kind}-{len(places)}"
     units = [c.guess for c in places]
-    lengths, angles = sum(u in ("m", "mm") for u in units), sum(u in ("rad", "deg") for u in units)
+    lengths, angles = sum(u in LENGTHS for u in units), sum(u in ANGLES for u in units)
 
     def suits(plant: type[Plant]) -> bool:
         turning = sum(c.unit == "rad" for c in plant.coordinates)

@@ -10,10 +10,11 @@ from upright.physics.statement import Coordinate
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
+from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.recognise import in_dac_counts
 from upright.study.text import TomlTable, Value
 
-PLACES = ("rad", "deg", "m", "mm")
+PLACES = (*ANGLES, *LENGTHS)
 EFFORTS = ("V", "A", "N", "N m")
 """Units of commands: a gain per mV would call a thousandth of it by the same number."""
 ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
@@ -38,7 +39,7 @@ def parameters_left_at_zero(table: TomlTable, plant: type[Plant], names: Iterabl
     """Add parameters that nobody asks for yet, commented out."""
     names = list(names)
     if names:
-        table.line("# left at zero until asked for:")
+        table.line("# zero until estimated:")
     for name in names:
         what = plant.quantity(name)
         unit = "" if what.unit == "1" else f" {what.unit}"

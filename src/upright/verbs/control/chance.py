@@ -1,4 +1,4 @@
-"""The chance that gains hold a rig, told before anything moves: `chance`."""
+"""Predicted probability that gains stabilise a rig: `chance`."""
 
 from __future__ import annotations
 
@@ -17,6 +17,11 @@ from upright.verbs.values import Start, read_start
 if TYPE_CHECKING:
     from upright.control.preflight import Preflight
     from upright.verbs.values import Workforce
+
+UNSUPPORTED = (
+    "The probability of stabilisation is not supported: it would be that of the model, and the rig is not known to be "
+    "like it. Identify the rig so that its fit is trusted, then ask again."
+)
 
 
 @renamed({**LET_GO, **CLUSTER})
@@ -46,7 +51,7 @@ def chance(
     workers : int, str or executor
         Who simulates them, as in `regulate`.
     progress : callable, optional
-        Told how many are done.
+        Called with how many are completed.
     **on
         Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 
@@ -55,14 +60,13 @@ def chance(
     BadInput
         When something of the rig is not known, or the gains do not fit it.
     """
-    from upright.basis import SIMULATED
+    from upright.basis import NOT_SUPPORTED, SIMULATED, in_percent
     from upright.control.preflight import WORDS, Task, preflight
     from upright.designing.run import SPEEDS, velocities
     from upright.experiments.regulation_2.run import HAND, START
     from upright.gains import feedback
     from upright.report.page import Chapter, Part, Table, resting_on
     from upright.report.rig import rig_table
-    from upright.report.symbols import percent
     from upright.rig.completion import completed, doubts
     from upright.rig.makes import make_of_vendor
     from upright.rig.variation import allowed
@@ -93,49 +97,47 @@ def chance(
     let_go |= read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
     task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)
     others = allowed(rig, draws, seed)
-    told = preflight(
+    predicted = preflight(
         rig, model, sampled, law, task, parameters=others, lanes=draws, seed=seed, workers=shared, progress=progress
     )
-    low, high = _wilson(round(told.chance * draws), draws)
-    share = f"{percent(100 * told.chance)} (95 % interval {percent(100 * low)} to {percent(100 * high)})"
-    rows = tuple((word, percent(100 * told.words[word])) for word in WORDS)
-    table = Table(caption="What the runs come to", headings=("outcome", "share"), rows=rows, numbers=(1,))
-    limits = "" if told.margins is None else (
-        f"It recovers from tilts up to {math.degrees(told.tilt):.2g}° and from taps up to {told.push:.2g} rad/s."
+    low, high = predicted.interval
+    share = f"{in_percent(predicted.share)} (95 % interval {in_percent(low)} to {in_percent(high)})"
+    supported = predicted.basis.supported
+    rows = tuple((word, in_percent(predicted.words[word])) for word in WORDS)
+    caption = "What the runs come to" if predicted.basis.supports else (
+        f"What simulated runs of the model come to; of the rig that is {NOT_SUPPORTED}"
+    )  # fmt: skip
+    table = Table(caption=caption, headings=("outcome", "share"), rows=rows, numbers=(1,))
+    limits = "" if predicted.margins is None else (
+        f"It recovers from tilts up to {math.degrees(predicted.tilt):.2g}° and taps up to {predicted.push:.2g} rad/s."
     )  # fmt: skip
     doubt = [] if known.draws else ["The fit has no covariance: only dry friction and the hand vary."]
     doubt += doubts(known, rig)
     chapter = Chapter(
         title=f"Chance that the gains hold the {rig.name}",
         verdict=f"Stabilised for {seconds:g} s on {share} of {draws} rigs sampled from the fit's covariance"
-        f"{_effort(told)}", detail=limits,
-        sound=told.quiet_chance > 0.95, warnings=tuple(doubt),
+        f"{_effort(predicted)}" if predicted.basis.supports else UNSUPPORTED, detail=limits,
+        sound=predicted.quiet_share > 0.95, warnings=tuple(doubt),
         parts=(Part("Before the run", (table,)), Part("The rig", (rig_table(rig),))),
-        numbers={"chance": told.chance, "interval": (low, high), "words": dict(told.words),
-                 "quiet_chance": told.quiet_chance, "rest_rms_95": told.rest_rms, "tilt": told.tilt,
-                 "push": told.push, "noise": told.noise, "draws": draws, "seed": seed},
+        numbers={"chance": supported(predicted.share), "interval": supported((low, high)),
+                 "words": dict(predicted.words), "quiet_chance": supported(predicted.quiet_share),
+                 "rest_rms_95": predicted.rest_rms, "tilt": predicted.tilt,
+                 "push": predicted.push, "noise": predicted.noise, "draws": draws, "seed": seed},
     )  # fmt: skip
-    return Answer(told, resting_on(chapter, known.basis, SIMULATED))
+    return Answer(predicted, resting_on(chapter, known.basis, SIMULATED))
 
 
-def _effort(told: Preflight) -> str:
+def _effort(preflight: Preflight) -> str:
     """What holding takes, as the end of a sentence."""
+    from upright.basis import in_percent
     from upright.control.effort import QUIET_PEAK, QUIET_RMS, of_limit
-    from upright.report.symbols import percent
 
-    if not told.drawn.held.any():
+    if not preflight.drawn.held.any():
         return "."
-    if told.quiet_chance > 0.95:
-        return f"; on 95 % of those the command at rest has an rms of {of_limit(told.rest_rms, 'at most ')}."
+    if preflight.quiet_share > 0.95:
+        return f"; on 95 % of those the command at rest has an rms of {of_limit(preflight.rest_rms, 'at most ')}."
     return (
-        f". Only {percent(100 * told.quiet_chance)} settle with a command that is quiet at rest: its rms reaches "
-        f"{of_limit(told.rest_rms)} ({100 * QUIET_RMS:.0f} % is quiet) and its peak "
-        f"{100 * float(told.drawn.rest_peak[told.drawn.held].max()):.0f} % ({100 * QUIET_PEAK:.0f} %)."
+        f". Only {in_percent(preflight.quiet_share)} settle with a command that is quiet at rest: its rms reaches "
+        f"{of_limit(preflight.rest_rms)} ({100 * QUIET_RMS:.0f} % is quiet) and its peak "
+        f"{100 * float(preflight.drawn.rest_peak[preflight.drawn.held].max()):.0f} % ({100 * QUIET_PEAK:.0f} %)."
     )
-
-
-def _wilson(held: int, of: int) -> tuple[float, float]:
-    from scipy.stats import binomtest
-
-    interval = binomtest(held, of).proportion_ci(method="wilson")
-    return float(interval.low), float(interval.high)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,9 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import Start, read_pole_list, read_start, si_if_given
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from upright.designing.run import Designed
     from upright.rig import Rig
     from upright.systems import StateSpace
@@ -56,7 +60,7 @@ def design(
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
     The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
-    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is asked for; period, delay and
+    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is requested; period, delay and
     differenced encoders are then put in.
 
     Parameters
@@ -71,7 +75,8 @@ def design(
     at : str, optional
         Equilibrium; the last that the plant names when omitted.
     poles : str or sequence of complex
-        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``; proposed when neither these nor weights are given.
+        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``, or ``"set 3"`` of Table 1 as in `regulate`; proposed when
+        neither these nor weights are given.
     lqr : str or sequence of float
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
     effort_weight : float, optional
@@ -82,7 +87,7 @@ def design(
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool
-        Gains whose sampled loop has the poles asked.
+        Gains whose sampled loop has the requested poles.
     seed : int
         Of the rigs drawn from the fit's covariance.
     out : path, optional
@@ -110,21 +115,21 @@ def design(
     from upright.rig.completion import completed
 
     folder_at, on = folder_if_given(out, pdf), known_options(DesignOptions, on, "design")
-    asked, weights = _poles(poles), _numbers(lqr)
-    if asked is not None and weights is not None:
+    requested, weights = _pole_set(poles), _numbers(lqr)
+    if requested is not None and weights is not None:
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states), not both.')
     if (source is None) == (matrices is None):
         raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
-    wish = DesignRequest(
-        at="", poles=asked, weights=weights, R=effort_weight, delay=on.get("delay"),
+    request = DesignRequest(
+        at="", poles=requested, weights=weights, R=effort_weight, delay=on.get("delay"),
         lag=si_if_given(on.get("lag"), "s"), memory=on.get("memory", 0.5), track=track, sampled=sampled,
     )  # fmt: skip
     if matrices is not None or is_linear(source):
         if at or {"counts", "vendor"} & on.keys():
             raise BadInput("--at, --counts and --vendor are of a rig, and plain matrices are none; leave them out.")
         rig = read_matrices(matrices) if matrices is not None else linear_model(source)
-        wish = replace(
-            wish, period=_sampling(rig, on.get("period")), speed=on.get("speed") or "",
+        request = replace(
+            request, period=_sampling(rig, on.get("period")), speed=on.get("speed") or "",
             limit=above_zero(on, "limit", rig.unit),
             start=_start(rig, start),
         )  # fmt: skip
@@ -140,49 +145,61 @@ def design(
             rig, rig_entries(rig.plant, rig.unit, on), vendor=on.get("vendor") or "",
             needs=("servo_period", "counts"), who="upright design",
         )  # fmt: skip
-        wish = replace(
-            wish, at=here, period=loop.period, speed=speed, resolution=tuple(loop.resolution.tolist()),
+        request = replace(
+            request, at=here, period=loop.period, speed=speed, resolution=tuple(loop.resolution.tolist()),
             limit=loop.saturation if math.isfinite(loop.saturation) else None, start=_start(rig, start), on=loop,
         )  # fmt: skip
         name = called(source)
-    done = design_unasked(rig, wish) if asked is None and weights is None else design_for(rig, wish)
-    told = chapter(done, source=name + as_typed(on), folder=typed(folder_at or Path()))
+    designed = design_unasked(rig, request) if requested is None and weights is None else design_for(rig, request)
+    page = chapter(designed, source=name + as_typed(on), folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
         files = [
-            write_json(folder_at / "design.json", told.numbers),
-            *write_page(told, folder_at / "design.html", pdf),
+            write_json(folder_at / "design.json", page.numbers),
+            *write_page(page, folder_at / "design.html", pdf),
         ]
-    return Answer(done, told, files)
+    return Answer(designed, page, files)
+
+
+def _pole_set(poles: str | Iterable[complex]) -> NDArray[np.complex128] | None:
+    """Poles that were asked for, those of a set of Table 1 by its name."""
+    name = re.fullmatch(r"\s*set\s*(\w+)\s*", poles, re.IGNORECASE) if isinstance(poles, str) else None
+    if name is None:
+        return _poles(poles)
+    from upright.experiments.regulation_2.run import SETS
+
+    if f"set {name[1]}" not in SETS:
+        raise BadInput(f"--poles \"set N\" takes 1 to {len(SETS)} of Table 1, got '{name[1]}'.")
+    return _poles(SETS[f"set {name[1]}"])
 
 
 def _sampling(model: StateSpace, period: float | str | None) -> float:
     """Period of the loop [s]; that of sampled matrices is theirs."""
-    asked = si_if_given(period, "s")
-    if asked is None and not model.dt:
+    requested = si_if_given(period, "s")
+    if requested is None and not model.dt:
         raise BadInput('these matrices are continuous, and a computer closes the loop: say how often, --period "2 ms".')
-    if asked is not None and model.dt and not math.isclose(asked, model.dt, rel_tol=1e-9):
+    if requested is not None and model.dt and not math.isclose(requested, model.dt, rel_tol=1e-9):
         raise BadInput(
-            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * asked:.6g} ms was "
-            "asked for; leave --period out, or give a continuous model."
+            f"these matrices are sampled every {1e3 * model.dt:.6g} ms, and a period of {1e3 * requested:.6g} ms is "
+            "requested; leave --period out, or give a continuous model."
         )
-    return model.dt or asked or 0.0
+    return model.dt or requested or 0.0
 
 
-def _numbers(given: str | Iterable[float]) -> tuple[float, ...] | None:
-    if not isinstance(given, str):
-        return tuple(float(x) for x in given) or None
-    if not given:
+def _numbers(text: str | Iterable[float]) -> tuple[float, ...] | None:
+    if not isinstance(text, str):
+        return tuple(float(x) for x in text) or None
+    if not text:
         return None
     try:
-        return tuple(float(part) for part in given.split(","))
+        return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {given[:60]!r}.') from None
+        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
 
 
-def _start(rig: Rig | StateSpace, given: Start) -> tuple[float, ...]:
+def _start(rig: Rig | StateSpace, start: Start) -> tuple[float, ...]:
     """Deviation, state by state in its unit; empty when none was given."""
-    said = read_start(given, rig.states, rig.state_units)
-    if said and not any(said.values()):
+    states = read_start(start, rig.states, rig.state_units)
+    if states and not any(states.values()):
         raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
-    return tuple(said.get(name, 0.0) for name in rig.states) if said else ()
+    return tuple(states.get(name, 0.0) for name in rig.states) if states else ()

@@ -86,7 +86,7 @@ def regulate(
         Who simulates those rigs: processes of this machine, the address of a Dask scheduler, or an executor of
         `concurrent.futures`; the numbers are the same.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **on
         Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 
@@ -100,15 +100,19 @@ def regulate(
     BadInput
         When the call contradicts itself or the fit, or poles cannot be placed.
     """
-    from upright.experiments.regulation_2.chapter import chapter
+    from upright.designing.chapter import chapter as design_chapter
+    from upright.experiments.regulation_2.chapter import chapter, design_of_best
     from upright.experiments.regulation_2.run import identify_make, run_regulation
     from upright.experiments.stand.twin import TwinStand
+    from upright.files import write_json
+    from upright.report.page import Step
+    from upright.report.symbols import typed
     from upright.rig.completion import completed, doubts, twin_of
     from upright.workers import Workers
 
     shared = Workers.of(workers)
     at, on = page_folder(out, pdf), known_options(HoldingOptions, on, "regulate")
-    wish = _wish("" if which == "" else str(which), poles, on, start, seconds, draws)
+    request = _request("" if which == "" else str(which), poles, on, start, seconds, draws)
     if source is None:
         make, seed = rig or "furuta", seed or 0
         progress("identifying the hanging twin", 0.0)
@@ -122,20 +126,26 @@ def regulate(
         known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="upright regulate"
     )
     truth = None if seed is None else twin_of(model, seed)
-    done = run_regulation(
+    result = run_regulation(
         model, None if truth is None else TwinStand(rig=truth), seed or 0, at,
-        lambda step, share: progress(step, base + (1 - base) * share), wish=wish,
+        lambda step, share: progress(step, base + (1 - base) * share), request=request,
         source=name, workers=shared,
     )  # fmt: skip
-    told = chapter(done)
+    page = chapter(result)
     if source is not None:
-        told = replace(told, warnings=(*told.warnings, *doubts(known, model, truth)))
-    files = write_page(told, at / "report.html", pdf)
-    numbers = {**told.numbers, "verdict": told.verdict, "report": str(files[0])}
-    return Answer(done, replace(told, numbers=numbers), files)
+        page = replace(page, warnings=(*page.warnings, *doubts(known, model, truth)))
+    files = write_page(page, at / "report.html", pdf)
+    design = design_of_best(result)
+    if design is not None:
+        files.append(write_json(at / "design.json", design_chapter(design, source=name, folder=typed(at)).numbers))
+        onward = Step(f"Take the law of {result.best.name} to the computer that closes the loop.",
+                      f"upright export {typed(files[-1])} --to c")  # fmt: skip
+        page = replace(page, steps=(onward, *page.steps))
+    numbers = {**page.numbers, "verdict": page.verdict, "report": str(files[0])}
+    return Answer(result, replace(page, numbers=numbers), files)
 
 
-def _wish(
+def _request(
     which: str, poles: str | Iterable[complex], on: HoldingOptions, start: Start, seconds: float, draws: int,
 ) -> RegulationRequest:  # fmt: skip
     from upright.experiments.regulation_2.run import SETS, RegulationRequest

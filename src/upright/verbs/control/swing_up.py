@@ -79,7 +79,7 @@ def swing_up(
     Returns
     -------
     Answer
-        Of a `SwingUpRun`, which says whether it was `caught`; of the encoders' `Scales` when only they are asked.
+        Of a `SwingUpRun`, which says whether it was `caught`; of the encoders' `Scales` when only they are checked.
 
     Raises
     ------
@@ -105,9 +105,9 @@ def swing_up(
     else:
         identified = rig_of(source, "swing_up", seed=seed)
         known, on["vendor"] = known_of(identified), vendor_of(identified, rig, on, called(source))
-        given = rig_entries(identified.plant, identified.unit, on)
+        entries = rig_entries(identified.plant, identified.unit, on)
         needs = ("limit", "servo_period", "counts", "travel")
-        model = completed(identified, given, vendor=on.get("vendor") or "", needs=needs, who="upright swing-up")
+        model = completed(identified, entries, vendor=on.get("vendor") or "", needs=needs, who="upright swing-up")
         described = check is not None or not (model.draws or model.hardware.vendor)
         truth = model if described else twin_of(model, seed)
         doubt = doubts(identified, model, None if described else truth)
@@ -117,27 +117,27 @@ def swing_up(
     if check is not None:
         record, log = open_log(check)
         scales = scales_of_log(model, record, known)
-        told = check_chapter(model, scales, log.name, name or "FIT.json")
-        told = replace(told, warnings=(*told.warnings, *doubt))
-        return Answer(scales, told, write_page(told, at / "encoders.html", pdf))
+        page = check_chapter(model, scales, log.name, name or "FIT.json")
+        page = replace(page, warnings=(*page.warnings, *doubt))
+        return Answer(scales, page, write_page(page, at / "encoders.html", pdf))
     travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_lying(truth, lie))
-    done = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
-    told = chapter(done)
-    told = replace(told, warnings=(*told.warnings, *doubt))
+    result = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
+    page = chapter(result)
+    page = replace(page, warnings=(*page.warnings, *doubt))
     return Answer(
-        done, told, [*write_page(told, at / "swing_up.html", pdf), write_json(at / "swing_up.json", told.numbers)]
+        result, page, [*write_page(page, at / "swing_up.html", pdf), write_json(at / "swing_up.json", page.numbers)]
     )
 
 
 def _lying(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
     """The rig with one encoder that shows a multiple of what is true."""
     if isinstance(lie, str):
-        said = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]
+        lies = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]
     else:
-        said = [(name, str(value)) for name, value in lie.items()]
+        lies = [(name, str(value)) for name, value in lie.items()]
     names = [c.name for c in rig.plant.coordinates]
     factors = dict.fromkeys(names, 1.0)
-    for name, value in said:
+    for name, value in lies:
         if name not in names:
             raise BadInput(f"--lie names a coordinate as in \"theta=2\", got '{name}'; {nearest(name, names)}")
         try:
@@ -149,4 +149,4 @@ def _lying(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
                 f"--lie needs a factor between 0.01 and 100, or negative for swapped channels, got '{value}'."
             )
         factors[name] = factor
-    return replace(rig, scales=tuple(factors.values())) if said else rig
+    return replace(rig, scales=tuple(factors.values())) if lies else rig

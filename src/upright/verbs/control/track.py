@@ -74,7 +74,7 @@ def track(
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **on
         Of the rig: limit, and of a rig of your own period, counts, vendor; see `RigOptions`.
 
@@ -95,7 +95,7 @@ def track(
     from upright.rig.completion import completed, doubts
     from upright.rig.makes import SHAFTS, make_rig
 
-    at, asked = page_folder(out, pdf), known_options(RigOptions, on, "track")
+    at, options = page_folder(out, pdf), known_options(RigOptions, on, "track")
     own = _poles(poles)
     which = _sets(sets) or (() if own is not None else (1, 2, 3, 4))
     if source is None and rig not in SHAFTS:
@@ -106,33 +106,33 @@ def track(
     else:
         known = rig_of(source, "track")
         shaft_make(known.plant, f"'{known.name}'")
-        given, vendor = rig_entries(known.plant, known.unit, asked), asked.get("vendor") or ""
-        model = rig_of_file(completed(known, given, vendor=vendor, who="upright track"), Path(called(source)).name)
+        entries, vendor = rig_entries(known.plant, known.unit, options), options.get("vendor") or ""
+        model = rig_of_file(completed(known, entries, vendor=vendor, who="upright track"), Path(called(source)).name)
         doubt = doubts(known, model)
     size = si_if_given(step, model.plant.coordinates[-1].unit)
     if size is not None and not size > 0:
         raise BadInput(f"--step needs a size above 0, got '{step}'.")
     if source is None:
-        model = model.replace(limit=above_zero(asked, "limit", model.unit) or model.limit)
-        done = run_tracking(model, seed, at, progress, which=which, poles=own, step=size)
+        model = model.replace(limit=above_zero(options, "limit", model.unit) or model.limit)
+        result = run_tracking(model, seed, at, progress, which=which, poles=own, step=size)
     else:
-        done = track_on(model, None, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
-    told = chapter(done)
-    told = replace(
-        told, title=f"Experiment 3: {told.title.lower()}, {done.rig.name}",
-        numbers={**told.numbers, "verdict": told.verdict}, warnings=(*told.warnings, *doubt),
+        result = track_on(model, None, Path(called(source)), None, None, progress, which=which, poles=own, step=size)
+    page = chapter(result)
+    page = replace(
+        page, title=f"Experiment 3: {page.title.lower()}, {result.rig.name}",
+        numbers={**page.numbers, "verdict": page.verdict}, warnings=(*page.warnings, *doubt),
     )  # fmt: skip
-    return Answer(done, told, [write_json(at / "track.json", told.numbers), *write_page(told, at / "track.html", pdf)])
+    return Answer(
+        result, page, [write_json(at / "track.json", page.numbers), *write_page(page, at / "track.html", pdf)]
+    )
 
 
-def _sets(given: str | int | Sequence[int]) -> tuple[int, ...]:
-    if isinstance(given, int):
-        return (given,)
-    if not isinstance(given, str):
-        return tuple(given)
+def _sets(sets: str | int | Sequence[int]) -> tuple[int, ...]:
+    if isinstance(sets, int):
+        return (sets,)
+    if not isinstance(sets, str):
+        return tuple(sets)
     try:
-        return tuple(int(part) for part in given.split(",")) if given else ()
+        return tuple(int(part) for part in sets.split(",")) if sets else ()
     except ValueError:
-        raise BadInput(
-            f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {given[:40]!r}.'
-        ) from None
+        raise BadInput(f'--set takes numbers of Table 2 separated by commas, as in "1,4", got {sets[:40]!r}.') from None

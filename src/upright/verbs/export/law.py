@@ -16,20 +16,24 @@ if TYPE_CHECKING:
     from upright.exports.controller import SampledController
     from upright.exports.targets import LawTarget
 
+FILES = ("design.json", "swing_up.json")
+"""Of a folder, the first that is there."""
+
 
 def controller_of(source: Any) -> tuple[SampledController, str]:
     """The law to be written, and what it is called by."""
-    from upright.exports.controller import of_design, of_law
+    from upright.exports.controller import of_law
     from upright.exports.targets import TARGETS, RigTarget
 
-    if isinstance(source, Answer) and "law" in (source.numbers or {}):
+    if isinstance(source, Answer) and {"law", "rule"} & (source.numbers or {}).keys():
         from upright.files import plain_values
 
-        return of_design(plain_values(source.numbers), "this design"), "this design"
+        return _of_content(plain_values(source.numbers), "this design")
     if not isinstance(source, str | os.PathLike):
         return of_law(source), "this law"
     path = Path(source)
-    path = path / "design.json" if path.is_dir() else path
+    if path.is_dir():
+        path = next((p for p in (path / name for name in FILES) if p.exists()), path / FILES[0])
     if not path.exists():
         raise BadInput(f"{path} does not exist; `upright design ... -o FOLDER` writes FOLDER/design.json.")
     try:
@@ -42,7 +46,15 @@ def controller_of(source: Any) -> tuple[SampledController, str]:
             f"{path} is a fit, and a law is what `upright design {path} --poles ... -o FOLDER` makes of it; the rig "
             f"itself goes --to {', '.join(forms)} or {last}."
         )
-    return of_design(content, str(path)), str(path)
+    return _of_content(content, str(path))
+
+
+def _of_content(content: Any, name: str) -> tuple[SampledController, str]:
+    """The law of a design, or of a swing-up, whose file holds a rule."""
+    from upright.exports.controller import of_design, of_swing_up
+
+    swings = isinstance(content, dict) and ("rule" in content or "swing_up" in content)
+    return (of_swing_up if swings else of_design)(content, name), name
 
 
 def write_law(made: SampledController, name: str, target: LawTarget, at: Path, single: bool) -> Answer[tuple[str, ...]]:
@@ -56,7 +68,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
     if isinstance(made.law, Rule) and (single or not target.rules):
         of_rules = (t.name for t in TARGETS.own.values() if isinstance(t, LawTarget) and t.rules)
         raise BadInput(
-            f"a rule goes --to {', '.join(of_rules)} in double precision, since nobody knows what it makes of a "
+            f"a rule goes --to {', '.join(of_rules)} in double precision, since it is not known what it makes of a "
             f"rounding; got {'--float' if single else target.name}."
         )
     test = self_test(made)
@@ -65,7 +77,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
     unit, step = made.command_unit, float(made.converter.max(initial=0.0))
     warnings: list[str] = []
     if not math.isfinite(made.law.limit):
-        warnings.append("Nobody said how large a command may be, so the program limits none: design with --limit.")
+        warnings.append("The command's limit is not specified, so the program has none: design with --limit.")
     exact = f"{len(test.readings)} samples are replayed and compared bit for bit"
     miss = f"{number(test.single, 2)} {unit}".strip()
     if single:
@@ -75,7 +87,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
             warnings.append(f"Single precision may move a command by {miss}, {than}; a slower period moves it less.")
     else:
         warnings += filter(None, [target.warn(made, miss)])
-    told = Chapter(
+    page = Chapter(
         title=f"{made.title} for {target.name}", verdict=f"{name} is written for {target.name}; {exact}.",
         parts=(Part("What it takes and gives", (Points(tuple(made.facts)),)),), warnings=tuple(warnings),
         steps=(
@@ -86,4 +98,4 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
             "samples": len(test.readings), "single_precision_misses": test.single,
         },
     )  # fmt: skip
-    return Answer(tuple(str(f) for f in files), resting_on(told, made.basis), files)
+    return Answer(tuple(str(f) for f in files), resting_on(page, made.basis), files)

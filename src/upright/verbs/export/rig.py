@@ -25,14 +25,14 @@ def write_rig(source: Any, target: RigTarget, at: Path, limit: float | None) -> 
         ours = (t for t in TARGETS.own.values() if isinstance(t, RigTarget) and t.limited)
         raise BadInput(f"the limit is that of the fit; --limit is for --to {', '.join(t.name for t in ours)}.")
     rig = rig_of(source, "export", draws=target.draws)
-    asked = RigExport(rig=rig, called=called(source), folder=at, kept=lambda: _kept(source, at), limit=limit)
-    contents, told = target.write(asked)
+    export = RigExport(rig=rig, called=called(source), folder=at, store=lambda: _saved(source, at), limit=limit)
+    contents, page = target.write(export)
     files = [replace_file(at / name, content) for name, content in contents.items()]
-    told = replace(told, numbers={"to": target.name, "files": [str(f) for f in files], **told.numbers})
-    return Answer(tuple(str(f) for f in files), resting_on(told, rig.basis), files)
+    page = replace(page, numbers={"to": target.name, "files": [str(f) for f in files], **page.numbers})
+    return Answer(tuple(str(f) for f in files), resting_on(page, rig.basis), files)
 
 
-def _kept(source: Any, at: Path) -> Path:
+def _saved(source: Any, at: Path) -> Path:
     """The fit.json of a source; of a fit in memory it is written now."""
     from upright.verbs.model.fit import FitAnswer
 

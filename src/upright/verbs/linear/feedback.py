@@ -1,4 +1,4 @@
-"""A loop around a linear model: gains by poles or by least cost, its model at the samples, prefilter and margins."""
+"""A loop around a linear model: gains by poles or by LQR, its model at the samples, prefilter and margins."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _read(model: Any, verb: str) -> StateSpace:
 
 @_model_first
 def place(model: Any, poles: Any) -> Gains:
-    """Gains that put the poles of a linear model where they are asked, by Ackermann's formula.
+    """Gains that put the poles of a linear model where requested, by Ackermann's formula.
 
     Parameters
     ----------
@@ -174,13 +174,13 @@ def place(model: Any, poles: Any) -> Gains:
     from upright.gains.requests import read_poles
 
     wanted = read_poles(poles) if isinstance(poles, str) else _complex(poles)
-    found = placed(model.A, model.B, wanted)
-    return Gains(K=found.K, poles=found.attained, S=None, model=model, sentence=found.sentence)
+    placement = placed(model.A, model.B, wanted)
+    return Gains(K=placement.K, poles=placement.attained, S=None, model=model, sentence=placement.sentence)
 
 
 @_model_first
 def lqr(model: Any, Q: Any, R: Any) -> Gains:
-    """Gains of least cost, the integral of ``x' Q x + u' R u``; ``K, S, E = lqr(...)`` as python-control gives it.
+    """LQR gains, which minimise the integral of ``x' Q x + u' R u``; ``K, S, E = lqr(...)`` as python-control gives it.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def lqr(model: Any, Q: Any, R: Any) -> Gains:
 
 @_model_first
 def dlqr(model: Any, Q: Any, R: Any) -> Gains:
-    """Gains of least cost of a sampled model, the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
+    """LQR gains of a sampled model, which minimise the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def hold(model: Any, period: Any, delay: float = 0.0, lag: float = 0.0, method: 
 
 @_model_first
 def observer(model: Any, poles: Any) -> Estimator:
-    """Observer of a sampled model whose error dies out with the poles asked.
+    """Observer of a sampled model whose error decays with the requested poles.
 
     Parameters
     ----------
@@ -403,12 +403,14 @@ def _row_of_gains(K: Any) -> Array:
         raise BadInput(f"K holds the gains of u = -K x, real numbers, one for each state, got {K!r:.40}.") from None
 
 
-def _weights(given: Any, size: int, name: str, of: str) -> Array:
+def _weights(weights: Any, size: int, name: str, of: str) -> Array:
     try:
-        w = np.asarray([float(x) for x in given.split(",")] if isinstance(given, str) else given, dtype=np.float64)
+        w = np.asarray(
+            [float(x) for x in weights.split(",")] if isinstance(weights, str) else weights, dtype=np.float64
+        )
     except (TypeError, ValueError):
         raise BadInput(
-            f"{name} takes numbers, one for each of the {size} {of}, or a matrix; got {given!r:.60}."
+            f"{name} takes numbers, one for each of the {size} {of}, or a matrix; got {weights!r:.60}."
         ) from None
     w = np.diag(np.atleast_1d(w)) if w.ndim < 2 else w
     if w.shape != (size, size):

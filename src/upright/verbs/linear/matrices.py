@@ -31,8 +31,8 @@ def linear_model(model: Any) -> StateSpace:
     """
     from upright.systems import StateSpace
 
-    found = StateSpace.of(model)
-    return found if found.name else replace(found, name="a linear model")
+    system = StateSpace.of(model)
+    return system if system.name else replace(system, name="a linear model")
 
 
 def read_matrices(path: str | os.PathLike[str]) -> StateSpace:
@@ -67,16 +67,18 @@ def read_matrices(path: str | os.PathLike[str]) -> StateSpace:
         raise root.error(
             "dt", f"a loop is closed every 1e-6 to 10 s, got {period:g} s; leave dt out if A is continuous"
         )
-    given = root.section("units")
+    section_of_units = root.section("units")
     known = [n for kind in names.values() for n in kind]
-    for name, unit in given.values.items():
+    for name, unit in section_of_units.values.items():
         if name not in known:
-            raise given.error(name, f"[units] names states, inputs and outputs, got '{name}'; {nearest(name, known)}")
+            raise section_of_units.error(
+                name, f"[units] names states, inputs and outputs, got '{name}'; {nearest(name, known)}"
+            )
         if not isinstance(unit, str):
-            raise given.error(name, f'a unit is text, such as {name} = "rad", got {unit!r:.40}')
-        with given.at(name):
+            raise section_of_units.error(name, f'a unit is text, such as {name} = "rad", got {unit!r:.40}')
+        with section_of_units.at(name):
             units.scale(unit)
-    return replace(model, dt=period or None, units=dict(given.values), name=path.stem, **names)
+    return replace(model, dt=period or None, units=dict(section_of_units.values), name=path.stem, **names)
 
 
 def _rows(root: Section, key: str) -> list[list[float]] | None:

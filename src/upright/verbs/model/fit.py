@@ -12,7 +12,7 @@ from upright.verbs.answer import Answer
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
-    from upright.identification import Fit, RunScore
+    from upright.identification import Estimate, Fit, RunScore
     from upright.identification.ladder.cross_validation import CrossValidation
     from upright.identification.model.bands import Bands
     from upright.physics import Plant
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class FitAnswer(Answer["Fit"]):
-    """A fit, with the study that asked for it.
+    """A fit, with its study.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class FitAnswer(Answer["Fit"]):
         from upright.report.page import Part, Picture, Points
         from upright.study.windows import windows
 
-        asked = {n: p for n, p in self.value.model.parameters.items() if p.estimate}
-        fit = replace(self.value, model=replace(self.value.model, parameters=asked))
+        estimated = {n: p for n, p in self.value.model.parameters.items() if p.estimate}
+        fit = replace(self.value, model=replace(self.value.model, parameters=estimated))
         drawn = Picture(
             name="fit", draw=lambda: self._drawn(80), caption="Data and model.", description="See the table of scores."
         )  # fmt: skip
@@ -67,12 +67,17 @@ class FitAnswer(Answer["Fit"]):
 
     def __getitem__(self, name: str) -> Any:
         """The `Estimate` of a parameter, or the value of one that was known: ``fit["l_cg"].value``."""
-        rig, found = self.value.model, self.value.estimates
-        if name in found:
-            return found[name]
+        rig, estimates = self.value.model, self.value.estimates
+        if name in estimates:
+            return estimates[name]
         if name not in rig.parameters:
-            raise BadInput(f"this fit has no parameter '{name}'; {nearest(name, [*found, *rig.parameters])}")
+            raise BadInput(f"this fit has no parameter '{name}'; {nearest(name, [*estimates, *rig.parameters])}")
         return rig.parameters[name]
+
+    @property
+    def ratios(self) -> Mapping[str, Estimate]:
+        """What is known of numbers that rest on assumed ones, per these: ``fit.ratios["b_2/m_p"]``."""
+        return {n: e for a in self.value.assumptions for n, e in a.ratios.items()}
 
     @property
     def parameters(self) -> Any:
@@ -123,8 +128,8 @@ class FitAnswer(Answer["Fit"]):
     @property
     def plant(self) -> Plant:
         """The plant with the numbers found and given."""
-        rig, found = self.value.model, self.value.estimates
-        values = {n: found[n].value if n in found else rig.parameters[n].value for n in rig.plant.names()}
+        rig, estimates = self.value.model, self.value.estimates
+        values = {n: estimates[n].value if n in estimates else rig.parameters[n].value for n in rig.plant.names()}
         return rig.plant(**values)
 
     def plot(self, name: str = "") -> Any:
@@ -166,9 +171,9 @@ class FitAnswer(Answer["Fit"]):
             from upright.study.draft.from_record import study_of_record
 
             record = open_log(other)[0]
-            given = {n: v for n, v in values.items() if n in rig.plant.names()}
+            known = {n: v for n, v in values.items() if n in rig.plant.names()}
             study = study_of_record(
-                record, rig.plant, known=given, ask=[], columns=columns, units=units,
+                record, rig.plant, known=known, ask=[], columns=columns, units=units,
                 window=window or (float(record.t[0]), float(record.t[-1])),
             )  # fmt: skip
         runs = [replace(run, role="predict") for run in study.runs]
@@ -208,11 +213,11 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | 
     from upright.report.page import Chapter, Part
 
     worst = min((v for s in runs.values() for v in s.fit_percent.values()), default=float("nan"))
-    found = promise(runs, bands)
+    kept = promise(runs, bands)
     part = Part("How much of each signal is explained", (score_table(runs),))
     chapter = Chapter(
-        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {found.sentence}", parts=(part,),
-        sound=found.kept, warnings=tuple(said for s in runs.values() for said in s.beyond),
+        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {kept.sentence}", parts=(part,),
+        sound=kept.holds, warnings=tuple(sentence for s in runs.values() for sentence in s.beyond),
         numbers={
             label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside}
             for label, s in runs.items()

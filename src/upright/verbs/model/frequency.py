@@ -30,7 +30,7 @@ class ResponseOptions(TypedDict, total=False):
     Parameters
     ----------
     kind : str, optional
-        What a log holds of these, when it is not told rightly.
+        What a log holds of these, when it is not recognised rightly.
     command : str, optional
         Column that drives.
     signal : mapping of str to str, optional
@@ -71,7 +71,7 @@ class ResponseOptions(TypedDict, total=False):
         "low": "Least frequency, in rad/s.",
         "high": "Greatest frequency, in rad/s.",
     },
-    given=lambda typed: {**typed, "progress": silent} if typed["sources"] else typed,
+    prepare=lambda typed: {**typed, "progress": silent} if typed["sources"] else typed,
     more="""
     A log without --rig gives the response alone; fit.json goes to upright design.
 
@@ -95,7 +95,7 @@ def frequency(
     Parameters
     ----------
     sources : path or sequence of paths, optional
-        Logs (repeats together), a frequency.csv, or a study; a twin is asked when omitted.
+        Logs (repeats together), a frequency.csv, or a study; a twin when omitted.
     rig : str
         Twin, or make of the logged rig: furuta, linear, rectilinear, torsional.
     seed : int
@@ -109,7 +109,7 @@ def frequency(
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **of_log
         Of the logs: kind, command, signal, counts, known, hold, low, high; see `ResponseOptions`.
 
@@ -125,29 +125,29 @@ def frequency(
     """
     from upright.rig.makes import MAKES
 
-    at, said = page_folder(out, pdf), known_options(ResponseOptions, of_log, "frequency")
-    kind = said.get("kind", "")
+    at, options = page_folder(out, pdf), known_options(ResponseOptions, of_log, "frequency")
+    kind = options.get("kind", "")
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
-    limits = _band(said.get("low"), said.get("high"))
+    limits = _band(options.get("low"), options.get("high"))
     files = [at / "frequency.csv"]
     if logs := [Path(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
-        wish = LogRequest(
-            make=rig, command=said.get("command", ""), signals=pairs(said.get("signal"), "--signal"), kind=kind,
-            seed=seed, hold=si_if_given(said.get("hold"), "s"), band=limits,
-            counts={n: _count(n, v) for n, v in pairs(said.get("counts"), "--counts").items()},
-            known={n: _known(n, v, rig) for n, v in pairs(said.get("known"), "--known").items()},
+        request = LogRequest(
+            make=rig, command=options.get("command", ""), signals=pairs(options.get("signal"), "--signal"), kind=kind,
+            seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
+            counts={n: _count(n, v) for n, v in pairs(options.get("counts"), "--counts").items()},
+            known={n: _known(n, v, rig) for n, v in pairs(options.get("known"), "--known").items()},
         )  # fmt: skip
-        found = response_of_logs(logs, wish, at, data=None if data is None else Path(data))
-        files += [at / "fit.json"] if found.answer else []
-        told = log_chapter(found)
+        result = response_of_logs(logs, request, at, data=None if data is None else Path(data))
+        files += [at / "fit.json"] if result.answer else []
+        page = log_chapter(result)
     else:
-        for name in [*said, *(["data"] if data is not None else [])]:
+        for name in [*options, *(["data"] if data is not None else [])]:
             option = {"low": "from", "high": "to"}.get(name, name)
             raise BadInput(f"--{option} belongs to a log, and none was named; name one, or leave the option out.")
         if not rig:
@@ -161,16 +161,16 @@ def frequency(
         from upright.rig.makes import make_named
 
         make_named(rig)
-        found = run_frequency(rig, seed, at, progress, kind=ask)
+        result = run_frequency(rig, seed, at, progress, kind=ask)
         files += [at / "sweep.csv", at / "fit.json"]
-        told = simulated(chapter(found))
-    files += write_page(told, at / "report.html", pdf)
-    numbers = {"verdict": told.verdict, "sound": told.sound, **told.numbers, "files": [str(f) for f in files]}
-    return Answer(found, replace(told, numbers=numbers), files)
+        page = simulated(chapter(result))
+    files += write_page(page, at / "report.html", pdf)
+    numbers = {"verdict": page.verdict, "sound": page.sound, **page.numbers, "files": [str(f) for f in files]}
+    return Answer(result, replace(page, numbers=numbers), files)
 
 
 def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
-    """Least and greatest frequency [rad/s] of those that were said."""
+    """Least and greatest frequency [rad/s] of those specified."""
     for value, option in ((low, "--from"), (high, "--to")):
         if value is not None and not 0 < value < math.inf:
             raise BadInput(f"{option} needs a frequency above 0 rad/s, got {value:g}; leave it out to take all.")
@@ -202,7 +202,7 @@ def _known(name: str, value: float | str | tuple[float, float], make: str) -> tu
         return si(value, ""), 0.0
     from upright.units import measured
 
-    plant = MAKES[make].plant
+    plant = MAKES[make].rig.plant
     if name in plant.names():
         return measured(value, plant.quantity(name).unit)
     return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")

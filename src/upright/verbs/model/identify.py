@@ -71,7 +71,7 @@ def _keys() -> str:
         "keys": Flag(help="Print every key a study may have.", prints=_keys),
         "strict": Flag(help="Exit with 3 when the verdict is not to trust it."),
     },
-    given=_read_first,
+    prepare=_read_first,
     wrong=lambda answer, keys, strict: strict and not answer.fit.trusted,
     more="""
     A study names a rig and the runs that speak about it:
@@ -146,7 +146,7 @@ def identify(
         Who computes the refits of ``hold_out="each"``: processes of this machine, the address of a Dask scheduler, or
         an executor of `concurrent.futures`.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **of_log
         For a log: ask, columns, units, window; see `LogOptions`.
 
@@ -172,59 +172,59 @@ def identify(
     folder, shared = folder_if_given(out, pdf), Workers.of(workers)
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
-    said = known_options(LogOptions, of_log, "identify")
-    asked = asked_study(study, plant, data=data, known=known, **said)
-    label = asked.path
+    options = known_options(LogOptions, of_log, "identify")
+    requested = requested_study(study, plant, data=data, known=known, **options)
+    label = requested.path
     held = [hold_out] if isinstance(hold_out, str) else list(hold_out)
-    each = "each" in held and all(run.label != "each" for run in asked.runs)
-    asked = asked.hold_out(*(name for name in held if not (each and name == "each")))
-    fitted = sum(run.role == "fit" for run in asked.runs)
+    each = "each" in held and all(run.label != "each" for run in requested.runs)
+    requested = requested.hold_out(*(name for name in held if not (each and name == "each")))
+    fitted = sum(run.role == "fit" for run in requested.runs)
     if each and fitted < 2:
         raise BadInput(f"{label}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
-    if not asked.model.estimated:
+    if not requested.model.estimated:
         raise BadInput(
-            f'{label}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
+            f'{label}: nothing to estimate; give one a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
             " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
         )
     if not fitted:
         raise BadInput(f'{label}: every run has role = "predict"; at least one needs role = "fit"')
-    fit = estimate(asked.model, asked.runs, method=method, progress=progress)
+    fit = estimate(requested.model, requested.runs, method=method, progress=progress)
     if each and fit.interrupted:
-        said = "Not evaluated: interrupted. No run was predicted by a fit of the others (--hold-out each)."
-        fit = replace(fit, warnings=(*fit.warnings, said), not_evaluated=(*fit.not_evaluated, "cross-validation"))
+        options = "Not evaluated: interrupted. No run was predicted by a fit of the others (--hold-out each)."
+        fit = replace(fit, warnings=(*fit.warnings, options), not_evaluated=(*fit.not_evaluated, "cross-validation"))
     written: list[Path] = []
     crossed = None
     if folder is not None:
         written.append(folder / "fit.json")
-        write_fit(fit, asked, written[0])
+        write_fit(fit, requested, written[0])
     if each and not fit.interrupted:
-        crossed = cross_validate(fit, asked.runs, progress=progress, workers=shared)
+        crossed = cross_validate(fit, requested.runs, progress=progress, workers=shared)
         if folder is not None:
-            write_fit(fit, asked, written[0], crossed)
-    told = chapter(
-        fit, title=asked.title or asked.path.stem.replace("_", " "), provenance=asked.provenance, crossed=crossed,
-        study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
-        folder=typed(folder) if folder is not None else "OUT", windows=windows(asked.runs),
+            write_fit(fit, requested, written[0], crossed)
+    page = chapter(
+        fit, title=requested.title or requested.path.stem.replace("_", " "), provenance=requested.provenance,
+        crossed=crossed, study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
+        folder=typed(folder) if folder is not None else "OUT", windows=windows(requested.runs),
     )  # fmt: skip
     if folder is not None and (report or pdf):
-        written += write_page(told, folder / "report.html", pdf)
-    return FitAnswer(fit, replace(told, numbers=fit_content(fit, asked, crossed)), written, asked, crossed)
+        written += write_page(page, folder / "report.html", pdf)
+    return FitAnswer(fit, replace(page, numbers=fit_content(fit, requested, crossed)), written, requested, crossed)
 
 
-def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
+def requested_study(source: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
     """The study that was handed in, or the one that a log and what is known of it make."""
     from upright.physics import Plant, find
     from upright.study.load import Study
 
     of_log = {name: value for name, value in options.items() if value is not None}
-    is_study = isinstance(given, Study) or (isinstance(given, str | Path) and _is_study(Path(given)))
+    is_study = isinstance(source, Study) or (isinstance(source, str | Path) and _is_study(Path(source)))
     if is_study:
         if of_log or plant is not None:
             name = next(iter(of_log), "plant")
             raise BadInput(f"{name} belongs to a log; the study says it itself, so change it there.")
-        if isinstance(given, Study):
-            return given
-        return read_study(Path(given), Path(), None if data is None else Path(data))
+        if isinstance(source, Study):
+            return source
+        return read_study(Path(source), Path(), None if data is None else Path(data))
     if isinstance(plant, str):
         plant = find(plant)
     if isinstance(plant, Plant):
@@ -233,7 +233,7 @@ def asked_study(given: Any, plant: Any = None, *, data: str | Path | None = None
         raise BadInput(f"identify takes a plant such as up.Pendulum, or its name, got {type(plant).__name__}.")
     from upright.study.draft.from_record import study_of_record
 
-    log: Any = given
+    log: Any = source
     return study_of_record(open_log(log)[0], plant, **options)
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
         "study": "Rig, runs and everything one might ask.",
         "out": "Folder for results; STUDY-ladder if left out.",
     },
-    given=lambda typed: {**typed, "out": typed["out"] or folder_beside(typed["study"], "ladder")},
+    prepare=lambda typed: {**typed, "out": typed["out"] or folder_beside(typed["study"], "ladder")},
     more="""
     Rungs of your own, in the study:
 
@@ -80,7 +80,7 @@ def ladder(
         Who predicts each run from a fit of the others: processes of this machine, the address of a Dask scheduler, or
         an executor of `concurrent.futures`.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def ladder(
     Raises
     ------
     BadInput
-        When the study or a log is wrong, or nothing is asked.
+        When the study or a log is wrong, or nothing is to be estimated.
     KeyboardInterrupt
         When Ctrl-C came before the first rung stood.
     """
@@ -106,38 +106,41 @@ def ladder(
     if isinstance(study, str | os.PathLike):
         study = Path(study)
         at = folder_beside(study, "ladder") if out is None else Path(out)
-        asked = read_study(study, at, None if data is None else Path(data))
+        requested = read_study(study, at, None if data is None else Path(data))
     else:
-        asked, study = _study(study, "ladder"), study.path
+        requested, study = _study(study, "ladder"), study.path
         at = folder_beside(study, "ladder") if out is None else Path(out)
     if out is not None:
         for name in ("ladder.json", "study.toml", "ladder.html"):
             check_output(at / name)
-    if not asked.model.estimated:
-        raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
-    climbed = climb(asked.model, asked.runs, asked.ladder or None, progress=progress, workers=shared)
+    if not requested.model.estimated:
+        raise BadInput(
+            f'{study}: nothing to estimate; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}'
+        )
+    climbed = climb(requested.model, requested.runs, requested.ladder or None, progress=progress, workers=shared)
     if not climbed.steps:
         raise KeyboardInterrupt
-    trimmed = study.is_file() and can_be_trimmed(asked, climbed)
+    trimmed = study.is_file() and can_be_trimmed(requested, climbed)
     files: list[Path] = []
-    numbers = ladder_content(climbed, asked)
+    numbers = ladder_content(climbed, requested)
     if out is not None:
         files.append(write_json(at / "ladder.json", numbers))
         if trimmed:
-            files.append(replace_file(at / "study.toml", chosen_study(asked, climbed).encode()))
+            files.append(replace_file(at / "study.toml", chosen_study(requested, climbed).encode()))
     where = typed(Path(data) if data is not None else study.parent)
-    told = chapter(
-        climbed, title=f"Ladder: {asked.title or asked.path.stem.replace('_', ' ')}", provenance=asked.provenance,
+    page = chapter(
+        climbed, title=f"Ladder: {requested.title or requested.path.stem.replace('_', ' ')}",
+        provenance=requested.provenance,
         steps=ladder_steps(climbed, study=typed(study), folder=typed(at), data=where, trimmed=trimmed),
     )  # fmt: skip
     if out is not None and (report or pdf):
-        files += write_page(told, at / "ladder.html", pdf)
-    return Answer(climbed, replace(told, numbers=numbers), files)
+        files += write_page(page, at / "ladder.html", pdf)
+    return Answer(climbed, replace(page, numbers=numbers), files)
 
 
-def _study(given: Any, verb: str) -> Study:
+def _study(source: Any, verb: str) -> Study:
     from upright.study.load import Study
 
-    if not isinstance(given, Study):
-        raise BadInput(f"{verb} takes a study: its file (TOML), or the .study of a fit, got {type(given).__name__}.")
-    return given
+    if not isinstance(source, Study):
+        raise BadInput(f"{verb} takes a study: its file (TOML), or the .study of a fit, got {type(source).__name__}.")
+    return source

@@ -72,7 +72,7 @@ def loadings(
     Raises
     ------
     BadInput
-        When logs and loadings do not match, or a column is not told.
+        When logs and loadings do not match, or a column is not named.
     NotIdentifiable
         When too few swings can be seen.
     """
@@ -80,25 +80,25 @@ def loadings(
     from upright.report.page import simulated
 
     at = folder_if_given(out, pdf)
-    given = paths(logs)
+    named = paths(logs)
     if twin:
-        if given or added:
+        if named or added:
             raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
-        found, told = weigh_twin(twin, seed, at)
-        told = simulated(told)
+        weighed, page = weigh_twin(twin, seed, at)
+        page = simulated(page)
     else:
-        if not given or len(texts(added)) != len(given):
+        if not named or len(texts(added)) != len(named):
             raise BadInput(
-                f"Every log needs its --added, in the same order: {len(given)} logs came with {len(texts(added))};"
+                f"Every log needs its --added, in the same order: {len(named)} logs came with {len(texts(added))};"
                 ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
             )
-        records = [(record, path.name) for record, path in map(open_log, given)]
-        found, told = weigh_logs(
+        records = [(record, path.name) for record, path in map(open_log, named)]
+        weighed, page = weigh_logs(
             records, texts(added), signal=signal, command=command, tolerance=si(tolerance, "1"), free=free
         )
-    files = [] if at is None else write_page(told, at / "report.html", pdf)
-    numbers = {**told.numbers, "report": str(files[0]) if files else ""}
-    return Answer(found, replace(told, numbers=numbers), files)
+    files = [] if at is None else write_page(page, at / "report.html", pdf)
+    numbers = {**page.numbers, "report": str(files[0]) if files else ""}
+    return Answer(weighed, replace(page, numbers=numbers), files)
 
 
 @command(
@@ -153,20 +153,20 @@ def plan_inertias(
     from upright.experiments.weighing_1a.plan import chapter, choices, fewest_runs
     from upright.identification.loadings import plan_loadings
     from upright.report.drawing import picture_format
-    from upright.rig.makes import OSCILLATORS
+    from upright.rig.makes import BODIES
     from upright.verbs.values import si_if_given
 
     if out is not None:
         picture_format(Path(out))  # before the work begins
-    if rig not in OSCILLATORS:
-        raise BadInput(f"--rig is {' or '.join(OSCILLATORS)}, got '{rig}'; {nearest(rig, OSCILLATORS)}")
+    if rig not in BODIES:
+        raise BadInput(f"--rig is {' or '.join(BODIES)}, got '{rig}'; {nearest(rig, BODIES)}")
     for value, option, most in ((runs, "--runs", 16), (levels, "--levels", 5)):
         if not 2 <= value <= most:
             raise BadInput(f"{option} needs a whole number from 2 to {most}, got {value}.")
-    body = OSCILLATORS[rig]
+    body = BODIES[rig]
     choice = choices(rig, [si(r, "m") for r in paths(radius) if r != ""])
-    given = si_if_given(bare, body.unit)
-    m_0 = body.plant.parameters()[body.inertia] if given is None else given
+    bare_inertia = si_if_given(bare, body.unit)
+    m_0 = body.rig.plant.parameters()[body.inertia] if bare_inertia is None else bare_inertia
     piece = min(w.added for w in choice if w.added > 0)
     piece = piece / 2 if rig == "torsional" else piece
     e, g = _share(error, "--error"), _share(tolerance, "--tolerance")
@@ -186,8 +186,8 @@ def plan_inertias(
     return Answer(plans, chapter(plans, chosen, wanted, body.unit), [] if out is None else [Path(out)])
 
 
-def _share(given: float | str, option: str) -> float:
-    value = si(given, "1")
+def _share(text: float | str, option: str) -> float:
+    value = si(text, "1")
     if not 0 <= value < 0.5:
-        raise BadInput(f"{option} needs a share between 0 and 50 %, got '{given}'; write it as '0.2 %'.")
+        raise BadInput(f"{option} needs a share between 0 and 50 %, got '{text}'; write it as '0.2 %'.")
     return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 
     upright predict swing-fit/fit.json other_day.toml
 
-    Exit code: 0 predicted as well as the fit promises, 3 worse, 2 the model, the
-    study or a log is wrong.
+    upright predict swing-fit/fit.json other_day.csv
+
+    Exit code: 0 predicted as well as the fit promises, 3 worse, or only runs that
+    the fit has seen, 2 the model, the study or a log is wrong.
     """,
 )
 @keeps_its_inputs
@@ -81,32 +84,35 @@ def predict(
     from upright.verbs.handover import called, fitted_of
 
     pdf_has_folder(out, pdf)
-    for given, what in ((model, "the model"), (study, "the study")):
-        if isinstance(given, str | os.PathLike) and not Path(given).exists():
-            raise BadInput(f"{what} {given} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
+    for source, what in ((model, "the model"), (study, "the study")):
+        if isinstance(source, str | os.PathLike) and not Path(source).exists():
+            raise BadInput(f"{what} {source} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
     fitted, of = fitted_of(model, "predict"), Path(called(model)).name
-    asked, on = _runs_to_predict(fitted, study, data)
-    missing = [n for n in fitted.values if n not in asked.model.parameters]
+    requested, on = _runs_to_predict(fitted, study, data)
+    missing = [n for n in fitted.values if n not in requested.model.parameters]
     if missing:
         raise BadInput(
-            f"{on}: the plant '{asked.plant}' has no parameter {missing[0]}, and {of} is a '{fitted.plant}';"
+            f"{on}: the plant '{requested.plant}' has no parameter {missing[0]}, and {of} is a '{fitted.plant}';"
             " both must be the same plant"
         )
-    rig = replace(asked.model, substeps=fitted.substeps)
-    runs = [replace(run, role="predict") for run in asked.runs]
+    rig = replace(requested.model, substeps=fitted.substeps)
+    runs = [replace(run, role="predict") for run in requested.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
-    found = promise(scores, fitted.bands, fitted.scores)
-    said = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
+    kept = promise(scores, fitted.bands, fitted.scores)
+    seen = {run.label: label for run in runs if (label := fitted.fitted_run(run.source))}
+    verdict = f"{_seen(seen, len(runs))}{kept.sentence}"
+    names = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,
-        "verdict": found.sentence,
-        "as_promised": found.kept,
-        "runs": {label: {name: getattr(s, name) for name in said} for label, s in scores.items()},
+        "verdict": verdict,
+        "as_promised": kept.holds,
+        "seen_in_the_fit": seen,
+        "runs": {label: {name: getattr(s, name) for name in names} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
-    told = Chapter(
-        title=f"{of} on {on}", verdict=found.sentence, sound=found.kept, numbers=numbers,
+    page = Chapter(
+        title=f"{of} on {on}", verdict=verdict, sound=kept.holds and len(seen) < len(runs), numbers=numbers,
         parts=(
             Part(
                 "How much of each signal is explained",
@@ -115,29 +121,38 @@ def predict(
         ),
         warnings=(
             *(() if fitted.trusted else (f"The model's own verdict was: {fitted.verdict}",)),
-            *fitted.hardware.unlike(asked.hardware), *(s for run in scores.values() for s in run.beyond), *offers,
+            *fitted.hardware.unlike(requested.hardware), *(s for run in scores.values() for s in run.beyond), *offers,
         ),
     )  # fmt: skip
     if out is None:
-        return Answer(scores, told)
+        return Answer(scores, page)
     at = folder(out)
     return Answer(
-        scores, told, [write_json(at / "prediction.json", numbers), *write_page(told, at / "prediction.html", pdf)]
+        scores, page, [write_json(at / "prediction.json", numbers), *write_page(page, at / "prediction.html", pdf)]
     )
 
 
-def _runs_to_predict(fitted: StoredFit, given: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:
+def _seen(seen: Mapping[str, str], runs: int) -> str:
+    """What has to stand before the verdict where runs were fitted: how they are explained is no prediction."""
+    if not seen:
+        return ""
+    which = ", ".join(f"'{run}' (as '{label}')" if run != label else f"'{run}'" for run, label in seen.items())
+    what = "This is no prediction: the fit has seen" if len(seen) == runs else "The fit has seen"
+    return f"{what} {which}. "
+
+
+def _runs_to_predict(fitted: StoredFit, source: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:
     """Study of the runs to score, and what it is called."""
     from upright.study.draft.from_record import study_of_record
     from upright.study.load import Study, load_study
 
-    if isinstance(given, Study):
-        return given, given.path.name
-    if isinstance(given, str | os.PathLike) and Path(given).suffix.lower() in (".toml", ""):
-        study = load_study(Path(given), data=None if data is None else Path(data), fixed=fitted.values)
-        return study, Path(given).name
+    if isinstance(source, Study):
+        return source, source.path.name
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() in (".toml", ""):
+        study = load_study(Path(source), data=None if data is None else Path(data), fixed=fitted.values)
+        return study, Path(source).name
     kind = fitted.kind
-    record, path = open_log(given)
+    record, path = open_log(source)
     known = {n: v for n, v in fitted.values.items() if n in kind.names()}
     whole = (float(record.t[0]), float(record.t[-1]))
     study = study_of_record(record, kind, known=known, ask=[], window=whole)

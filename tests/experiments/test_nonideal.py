@@ -1,4 +1,4 @@
-"""Are the flaws of worn twins those that are told, and the rest of the rig as it was?"""
+"""Are the flaws of non-ideal twins those that are told, and the rest of the rig as it was?"""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from upright.experiments.worn import worn
+from upright.experiments.nonideal import nonideal
 from upright.physics.equations import mass_and_force
 from upright.rig.makes import PENDULUMS, make_of, make_rig
 from upright.simulation import simulate
@@ -21,10 +21,10 @@ def force_at_rest(plant, q):
 
 
 @pytest.mark.parametrize("key", PENDULUMS)
-def test_a_worn_rig_has_the_same_numbers_and_flaws_within_the_sizes_told(key):
+def test_a_nonideal_rig_has_the_same_numbers_and_flaws_within_the_sizes_told(key):
     sound = make_rig(key, 5)
     for seed in range(1, 30):
-        rig = worn(sound, seed)
+        rig = nonideal(sound, seed)
         plant = rig.plant
         assert make_of(plant).key == key
         same = [n for n in sound.plant.names() if not n.startswith(("tilt", "b_1s", "b_2s", "v_"))]
@@ -38,17 +38,17 @@ def test_a_worn_rig_has_the_same_numbers_and_flaws_within_the_sizes_told(key):
         np.testing.assert_array_equal(plant.linear("inverted").A, sound.plant.linear("inverted").A)
 
 
-def test_the_torque_of_a_worn_furuta_ripples_with_its_angle():
-    plant = worn(make_rig("furuta", 5), 2).plant.replace(tilt_x=0.0, tilt_y=0.0)
+def test_the_torque_of_a_nonideal_furuta_ripples_with_its_angle():
+    plant = nonideal(make_rig("furuta", 5), 2).plant.replace(tilt_x=0.0, tilt_y=0.0)
     for psi in (-0.4, 0.0, 1.3):
         f = force_at_rest(plant, (psi, 0.0))
         assert f[0] == pytest.approx(plant.T_r * math.sin(plant.n_r * psi + plant.phi_r), abs=1e-12)
         assert f[1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a_worn_cart_without_friction_rolls_down_its_slope():
+def test_a_nonideal_cart_without_friction_rolls_down_its_slope():
     """The centre of mass of cart and hanging pendulum gains g times the slope, whatever swings below."""
-    plant = worn(make_rig("linear", 5), 2).plant
+    plant = nonideal(make_rig("linear", 5), 2).plant
     bare = plant.replace(F_r=0.0, **dict.fromkeys(("b_1", "b_2", "b_1c", "b_2c", "b_1s", "b_2s"), 0.0))
     x, _, theta, _ = simulate(bare, {}, np.zeros(4), None, 1e-3, samples=2001)[-1, :, 0]
     centre = x + bare.m_p * bare.l_cg * math.sin(theta) / (bare.m_c + bare.m_p)

@@ -12,7 +12,7 @@ from upright.workers import Workers, spread
 T = TypeVar("T")
 
 
-def run_abreast(
+def run_parallel(
     seconds: Mapping[str, float], needs: Mapping[str, Sequence[str]],
     one: Callable[[str, Mapping[str, T], Progress], T], workers: Workers, progress: Progress,
 ) -> tuple[dict[str, T], bool]:  # fmt: skip
@@ -27,20 +27,20 @@ def run_abreast(
     one : callable
         Of a key and the results that it needs. It runs in another process.
     """
-    found: dict[str, T] = {}
+    results: dict[str, T] = {}
     behind, whole = 0.0, sum(seconds.values())
-    while len(found) < len(seconds):
-        ready = [k for k in seconds if k not in found and all(n in found for n in needs[k])]
+    while len(results) < len(seconds):
+        ready = [k for k in seconds if k not in results and all(n in results for n in needs[k])]
         ready.sort(key=lambda k: -seconds[k])
         ahead = behind + sum(seconds[k] for k in ready)
         tell = part(progress, behind / whole, ahead / whole, f"experiments {', '.join(sorted(ready))}")
-        items = [(k, {n: found[n] for n in needs[k]}) for k in ready]
-        done = spread(partial(_one, one), items, workers=workers, progress=tell, what="experiment")
-        found |= {ready[i]: result for i, result in done.results.items()}
-        if done.interrupted:
-            return found, True
+        items = [(k, {n: results[n] for n in needs[k]}) for k in ready]
+        ready_results = spread(partial(_one, one), items, workers=workers, progress=tell, what="experiment")
+        results |= {ready[i]: result for i, result in ready_results.results.items()}
+        if ready_results.interrupted:
+            return results, True
         behind = ahead
-    return found, False
+    return results, False
 
 
 def _one(

@@ -28,7 +28,7 @@ RIPPLE, RIPPLES = 0.2, (6, 24)
 TILT, LATE, OFF_CENTRE = math.radians(0.3), 2e-3, math.radians(0.1)
 
 
-def worn(rig: Rig, seed: int) -> Rig:
+def nonideal(rig: Rig, seed: int) -> Rig:
     """The rig of a make with flaws of its own, its name and numbers as they were.
 
     Parameters
@@ -46,10 +46,10 @@ def worn(rig: Rig, seed: int) -> Rig:
         phase=tuple(rng.uniform(0, 2 * math.pi, size).tolist()), turn=tuple(TURN[u] for u in units),
     )  # fmt: skip
     late = rig.delay + rng.uniform(0, LATE)
-    return rig.replace(plant=_worn_plant(rig, rng), delay=float(late), mounting=mounting)
+    return rig.replace(plant=_nonideal_plant(rig, rng), delay=float(late), mounting=mounting)
 
 
-def _worn_plant(rig: Rig, rng: np.random.Generator) -> Plant:
+def _nonideal_plant(rig: Rig, rng: np.random.Generator) -> Plant:
     plant = rig.plant
     values = plant.parameters()
     units = {c.name: c.unit for c in plant.coordinates}

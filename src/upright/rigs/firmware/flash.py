@@ -1,0 +1,119 @@
+"""An image onto a board: the port found, the person asked, what was written read back, the firmware greeted."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from upright.errors import BadInput, RigStopped
+from upright.rigs.firmware.boards import BoardKind
+from upright.rigs.line import ports
+from upright.rigs.serial import SerialRig
+
+_LOOKS, _WRITES = 10.0, 90.0  # s, after which a flasher is ended that finds no board, or does not come to its end
+Run = Callable[[Sequence[str], float], "subprocess.CompletedProcess[str]"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flashed:
+    """What happened.
+
+    Attributes
+    ----------
+    port : str
+    image : Path
+    greeting : str
+        What the firmware answered afterwards.
+    """
+
+    port: str
+    image: Path
+    greeting: str
+
+
+def port_of(board: BoardKind, port: str, there: dict[str, int]) -> str:
+    """The port that is meant, or the only one a board of this kind is at.
+
+    Raises
+    ------
+    BadInput
+        When there is none, or more than one.
+    """
+    if port:
+        return port
+    fitting = [name for name, vendor in there.items() if vendor in board.usb]
+    if len(fitting) == 1:
+        return fitting[0]
+    if not fitting:
+        others = f" (there are {', '.join(there)}, of other makers)" if there else ""
+        raise BadInput(f"no {board.title} is plugged in{others}; look at its cable, or say where it is with --port.")
+    raise BadInput(f"several boards are plugged in, at {', '.join(fitting)}; say which with --port.")
+
+
+def in_time(command: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
+    """A program's end, or that of our patience."""
+    try:
+        return subprocess.run(
+            command, capture_output=True, encoding="utf-8", errors="replace", timeout=seconds, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return subprocess.CompletedProcess(command, 1, "", f"it did not end within {seconds:g} s")
+
+
+def greeted(port: str) -> str:
+    """What the firmware at a port calls itself."""
+    rig = SerialRig(port, coordinates=("1", "2"), counts=(1.0, 1.0), command_unit="", full_scale=1.0)
+    try:
+        return rig.open().name
+    finally:
+        rig.close()
+
+
+def flash(
+    board: BoardKind, image: Path, port: str = "", *, hand: Callable[[str], bool] = lambda _: True, run: Run = in_time,
+    greet: Callable[[str], str] = greeted, there: Callable[[], dict[str, int]] = ports,
+) -> Flashed:  # fmt: skip
+    """Write an image onto a board, and greet what is on it then.
+
+    Parameters
+    ----------
+    board : BoardKind
+    image : Path
+    port : str
+        Where it is; found where it is empty.
+    hand : callable
+        Asked before anything is written.
+    run, greet, there : callable
+        A program for so many seconds; the firmware at a port; ports with their USB vendors.
+
+    Raises
+    ------
+    BadInput
+        When no board is found, or the flasher is not here.
+    RigStopped
+        When the person says no, the board does not answer within seconds, or what is on it is not what was written.
+    """
+    if shutil.which(board.flasher) is None:
+        raise BadInput(
+            f"to write the image, {board.flasher} must be on this machine (sudo apt install {board.flasher})."
+        )
+    at = port_of(board, port, there() if not port else {})
+    common = [board.flasher, "-p", board.name, "-c", "wiring", "-P", at, "-b", "115200", "-D"]
+    looked = run([*common, "-n"], _LOOKS)
+    if looked.returncode:
+        raise RigStopped(f"No {board.title} answers at {at}: {_last(looked.stderr)} Look at cable and port.")
+    if not hand(f"The {board.title} at {at} gets {image.name}; what is on it is lost. Its motor's supply is off."):
+        raise RigStopped("Nothing was written.")
+    written = run([*common, "-U", f"flash:w:{image}:i"], _WRITES)  # reads it back by itself
+    if written.returncode:
+        raise RigStopped(f"The image was not written whole: {_last(written.stderr)} Flash again.")
+    return Flashed(port=at, image=image, greeting=greet(at))
+
+
+def _last(text: str) -> str:
+    """The flasher's last word, as a sentence."""
+    lines = [line.strip() for line in text.splitlines() if line.strip() and "done" not in line]
+    return (lines[-1].rstrip(".") if lines else "it printed nothing") + "."

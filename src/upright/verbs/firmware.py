@@ -1,0 +1,192 @@
+"""The firmware of a board of one's own: built, flashed, its wires."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from upright.files import keeps_its_inputs, replace_file
+from upright.verbs.answer import Answer
+from upright.verbs.command import command
+
+if TYPE_CHECKING:
+    from upright.rigs.firmware import Flashed, Image, Pin
+
+_METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"}
+
+
+@command(
+    name="firmware build",
+    metavars=_METAVARS,
+    more="""
+    upright firmware build --drive pair
+    upright firmware build --drive pair --rig RIG.toml     ceilings that no host can widen: the rig's own limits
+    """,
+)
+@keeps_its_inputs
+def firmware_build(
+    *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] = "upright-firmware",
+) -> Answer[Image]:  # fmt: skip
+    """Make the image that goes onto a board.
+
+    Where no compiler is, the image that comes with the package is taken, if it has one.
+
+    Parameters
+    ----------
+    board : str
+        ``"mega"``, an Arduino Mega 2560.
+    drive : str
+        ``"analog"``: a converter into a servo amplifier; ``"pair"``: an H-bridge with a PWM line for each way
+        (BTS7960, DRV8871); ``"sign"``: one PWM line and the way (VNH5019, L298N).
+    rig : path, optional
+        RIG.toml whose [limits] are compiled in as ceilings.
+    out : path
+        Folder for the image.
+
+    Returns
+    -------
+    Answer
+        Of an `Image`: its `path`, whether it came `ready`, its `ceilings`.
+
+    Raises
+    ------
+    BadInput
+        When there is no such board, or a tool is missing.
+    """
+    from upright.report.page import Chapter, Facts, Part
+    from upright.rigs.firmware import board_of, build
+
+    made = board_of(board)
+    image = build(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
+    whence = "As it comes with this package." if image.ready else "Built here."
+    held = tuple((name.lower().replace("_", " "), str(value)) for name, value in image.ceilings.items())
+    return Answer(
+        image,
+        Chapter(
+            title=f"Firmware for the {made.title}", verdict=f"{image.path.name} is ready to be flashed.", detail=whence,
+            parts=(Part("Ceilings, in counts, percent and ticks", (Facts(held),)),) if held else (),
+            numbers={"image": str(image.path), "ready": image.ready, "ceilings": dict(image.ceilings)},
+        ),
+        [image.path],
+    )  # fmt: skip
+
+
+@command(
+    name="firmware flash",
+    metavars=_METAVARS,
+    more="""
+    With the motor's supply off.
+
+    upright firmware flash --drive pair --rig RIG.toml
+    """,
+)
+def firmware_flash(
+    *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None, port: str = "",
+    out: str | os.PathLike[str] = "upright-firmware", hand: Callable[[str], bool] = lambda _: True,
+) -> Answer[Flashed]:  # fmt: skip
+    """Build the image and write it onto the board: port found, you asked, read back, greeted.
+
+    Without a board it ends within seconds.
+
+    Parameters
+    ----------
+    board, drive : str
+        As of `firmware_build`.
+    rig : path, optional
+        RIG.toml whose [limits] are compiled in as ceilings.
+    port : str
+        Where the board is; found where it is left out.
+    out : path
+        Folder for the image.
+    hand : callable, optional
+        Asked before anything is written.
+
+    Returns
+    -------
+    Answer
+        Of a `Flashed`: `port`, `image`, the firmware's `greeting`.
+
+    Raises
+    ------
+    BadInput
+        When no board is found, or a tool is missing.
+    RigStopped
+        When the board does not answer, or does not hold what was written.
+    """
+    from upright.report.page import Chapter
+    from upright.rigs.firmware import board_of, build, flash
+
+    made = board_of(board)
+    image = build(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
+    done = flash(made, image.path, port, hand=hand)
+    return Answer(
+        done,
+        Chapter(
+            title=f"Firmware on the {made.title}", verdict=f"{done.greeting} answers.",
+            detail="It was read back as it was written. It stands in FAULT until a host clears it.",
+            numbers={"port": done.port, "image": str(done.image), "greeting": done.greeting},
+        ),
+        [image.path],
+    )  # fmt: skip
+
+
+@command(name="firmware pins", metavars={**_METAVARS, "out": "DRAWING.svg"})
+def firmware_pins(
+    *, board: str = "mega", drive: str = "analog", out: str | os.PathLike[str] | None = None
+) -> Answer[tuple[Pin, ...]]:
+    """Say which wire goes where, from the table that the firmware is compiled with.
+
+    Parameters
+    ----------
+    board, drive : str
+        As of `firmware_build`.
+    out : path, optional
+        File for a drawing of it (SVG).
+
+    Returns
+    -------
+    Answer
+        Of a tuple of `Pin`: `number`, `name`, `signal`, `device`, `terminal`.
+
+    Raises
+    ------
+    BadInput
+        When there is no such board or drive.
+    """
+    from upright.report.page import Chapter, Part, Table
+    from upright.rigs.firmware import board_of, pins, wiring
+    from upright.rigs.firmware.boards import DRIVES
+
+    made = board_of(board)
+    wires = pins(made, drive)
+    rows = tuple((str(pin.number), pin.name, pin.device, pin.terminal) for pin in wires)
+    table = Table(caption="", headings=("pin", "", "goes to", ""), rows=rows)
+    files = [] if out is None else [replace_file(Path(out), wiring(made, drive, wires).encode())]
+    return Answer(
+        wires,
+        Chapter(
+            title=f"Wires of the {made.title}", verdict=f"For {DRIVES[drive]}.",
+            detail="Grounds of board, encoders and power stage are joined at one point.",
+            parts=(Part("Wires", (table,)),), numbers={pin.signal: pin.number for pin in wires},
+        ),
+        files,
+    )  # fmt: skip
+
+
+def _ceilings(path: Path) -> dict[str, int]:
+    """A rig's own limits as its board can be compiled for them."""
+    from upright.errors import BadInput
+    from upright.rigs.driver import FULL_SCALE
+    from upright.rigs.firmware import ceilings_of
+    from upright.rigs.rigfile import read_rig_file
+    from upright.running.rig import described
+
+    file = read_rig_file(path)
+    rig, _ = described(file)
+    limits = file.limits({c.name: c.unit for c in rig.plant.coordinates}, rig.unit)
+    if limits is None:
+        raise BadInput(f"{path} has no [limits]; the board's ceilings are made of them.")
+    return ceilings_of(limits, rig.per_unit, float(file.board.get("full_scale", FULL_SCALE)))

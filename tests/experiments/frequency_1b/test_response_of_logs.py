@@ -1,0 +1,125 @@
+"""Is the response of logs that of the motion in them, whatever their columns are called and in whichever unit?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from upright.errors import BadInput, NotIdentifiable
+from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
+from upright.identification.frequency.response import FrequencyResponse
+from upright.records import Record
+
+DT, LENGTH, PERIODS = 0.01, 1000, 5
+LINES = np.array([3, 7, 15, 31, 63])
+OMEGA = 2 * math.pi * LINES / (LENGTH * DT)
+A, B = 3.0, 2.0
+"""theta' = -A theta + B u: its response is B/(j omega + A)."""
+
+
+def write(path, scale=1.0, unit="rad", command="u", column="theta", other=None):
+    """Five periods of a motion in steady state, as its closed form has it."""
+    t = np.arange(LENGTH * PERIODS) * DT
+    waves = np.exp(1j * (OMEGA * t[:, None] + np.arange(LINES.size)))
+    signals = {command: waves.real.sum(axis=1), column: scale * (waves * (B / (1j * OMEGA + A))).real.sum(axis=1)}
+    units = {command: "V", column: unit}
+    if other is not None:
+        signals["extra"] = other * t
+    Record(t=t, signals=signals, units=units, inputs=(command,), outputs=(column,)).to_csv(path)
+    return path
+
+
+def request(**more):
+    return LogRequest(**({"signals": {}, "counts": {}, "known": {}, "kind": "multisine"} | more))
+
+
+def asked(path, folder, **more):
+    return response_of_logs([path], request(**more), folder).response
+
+
+def closed(omega):
+    return B / (1j * omega + A)
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "counts", "to"),
+    [(1.0, "rad", {}, "rad"), (180 / math.pi, "deg", {}, "rad"), (2546.5, "counts", {"theta": 2546.5}, "rad"),
+     (-2546.5, "counts", {"theta": -2546.5}, "rad"), (1000.0, "mm", {}, "m")],
+)  # fmt: skip
+def test_a_column_in_any_unit_gives_the_response_in_rad_or_m(scale, unit, counts, to, tmp_path):
+    found = asked(write(tmp_path / "log.csv", scale, unit), tmp_path / "out", counts=counts)
+    np.testing.assert_allclose(found.omega, OMEGA, rtol=1e-6)
+    np.testing.assert_allclose(found.response[:, 0], closed(OMEGA), rtol=1e-3)
+    assert found.units == (to, "V")
+    again = FrequencyResponse.from_csv(tmp_path / "out" / "frequency.csv")
+    np.testing.assert_allclose(again.response, found.response, rtol=1e-6)
+
+
+def test_counts_stay_counts_where_no_fit_needs_more_and_are_refused_where_one_does(tmp_path):
+    path = write(tmp_path / "log.csv", 100.0, "counts")
+    found = asked(path, tmp_path / "out")
+    assert found.units == ("counts", "V")
+    np.testing.assert_allclose(found.response[:, 0], 100 * closed(OMEGA), rtol=1e-3)
+    with pytest.raises(BadInput, match=r"--counts theta=2546\.5"):
+        asked(path, tmp_path / "out", make="furuta")
+    with pytest.raises(BadInput, match="names 'psi', which is no output"):
+        asked(path, tmp_path / "out", counts={"psi": 3.0})
+
+
+def test_columns_are_taken_as_they_are_named(tmp_path):
+    path = write(tmp_path / "log.csv", column="alpha", command="volts", other=0.0)
+    found = asked(path, tmp_path / "out", command="volts", signals={"theta": "alpha"})
+    assert found.outputs == ("theta",)
+    np.testing.assert_allclose(found.response[:, 0], closed(OMEGA), rtol=1e-3)
+
+
+def test_a_log_that_does_not_say_what_drives_is_asked_for_it(tmp_path):
+    log = Record.from_csv(write(tmp_path / "log.csv"))
+    log.replace(inputs=(), outputs=log.names).to_csv(tmp_path / "unsaid.csv")
+    text = (tmp_path / "unsaid.csv").read_text(encoding="utf-8")
+    (tmp_path / "bare.csv").write_text(
+        "\n".join(line for line in text.splitlines() if not line.startswith("#")).replace("u", "a", 1), encoding="utf-8"
+    )
+    with pytest.raises(BadInput, match=r"say which one drives with --command"):
+        asked(tmp_path / "bare.csv", tmp_path / "out")
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_a_band_keeps_the_frequencies_within_it_its_ends_too(written, tmp_path):
+    """From logs and from a response alike."""
+    path = write(tmp_path / "log.csv")
+    if written:
+        asked(path, tmp_path / "out")
+        path = tmp_path / "out" / "frequency.csv"
+        OMEGA_READ = FrequencyResponse.from_csv(path).omega
+        found = asked(path, tmp_path / "again", band=(OMEGA_READ[1], OMEGA_READ[3]))
+    else:
+        found = asked(path, tmp_path / "out", band=(0.99 * OMEGA[1], 1.01 * OMEGA[3]))
+    np.testing.assert_allclose(found.omega, OMEGA[1:4], rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["multisine", ""])
+def test_logs_that_repeat_one_another_are_averaged_wherever_in_the_period_they_begin(kind, tmp_path):
+    """Of 4 n periods the standard error is half that of n, and the response nearer to the truth."""
+    rng = np.random.default_rng(5)
+    paths = [tmp_path / f"noisy{i}.csv" for i in range(4)]
+    for i, path in enumerate(paths):
+        log = Record.from_csv(write(path))
+        u, theta = (np.roll(log[n], 171 * i) for n in ("u", "theta"))
+        log.replace(signals={"u": u, "theta": theta + rng.normal(0, 0.05, len(log))}).to_csv(path)
+    one, four = (response_of_logs(some, request(kind=kind), tmp_path / "out").response for some in (paths[:1], paths))
+    # the scatter of a few periods is itself known to 1/sqrt(2 * 2) for each of five lines
+    assert np.median(four.error[:, 0] / one.error[:, 0]) == pytest.approx(0.5, rel=0.5)
+    np.testing.assert_allclose(four.response[:, 0] / closed(OMEGA), 1.0, atol=4 * four.error.max())
+    found = response_of_logs(paths, request(kind=kind), tmp_path / "out")
+    assert found.sources == tuple(p.name for p in paths)
+
+
+def test_logs_of_different_periods_are_refused(tmp_path):
+    first = write(tmp_path / "a.csv")
+    log = Record.from_csv(first)
+    log.replace(t=1.5 * log.t).to_csv(tmp_path / "b.csv")
+    with pytest.raises(NotIdentifiable, match="need one period, and hold 10 and 15 s"):
+        response_of_logs([first, tmp_path / "b.csv"], request(), tmp_path / "out")

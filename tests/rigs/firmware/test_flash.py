@@ -1,0 +1,97 @@
+"""Is a board found, asked about, written and read back, and does nothing wait for one that is not there?"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from upright.errors import BadInput, RigStopped
+from upright.rigs.firmware import board_of, flash
+from upright.rigs.firmware.flash import in_time
+
+MEGA, IMAGE = board_of("mega"), Path("atmega2560-pair.hex")
+ARDUINO, OTHER = 0x2341, 0x1234
+
+
+class Flasher:
+    """avrdude, whose calls fail as they are told to."""
+
+    def __init__(self, *codes: int) -> None:
+        self.codes, self.calls = list(codes), []
+
+    def __call__(self, command, seconds):
+        self.calls.append((command, seconds))
+        return subprocess.CompletedProcess(
+            command, self.codes.pop(0), "", "avrdude: ser_open(): can't open device\n\navrdude done.  Thank you.\n"
+        )
+
+
+def flashed(flasher, *, port="", there=None, hand=lambda _: True, greet=lambda port: f"firmware at {port}"):
+    return flash(MEGA, IMAGE, port, hand=hand, run=flasher, greet=greet, there=lambda: there or {})
+
+
+@pytest.fixture(autouse=True)
+def installed(monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda tool: f"/usr/bin/{tool}")
+
+
+def test_the_only_arduino_is_found_asked_about_written_and_greeted():
+    flasher, asked = Flasher(0, 0), []
+    done = flashed(flasher, there={"/dev/ttyS0": OTHER, "/dev/ttyACM0": ARDUINO}, hand=lambda s: not asked.append(s))
+    assert (done.port, done.greeting) == ("/dev/ttyACM0", "firmware at /dev/ttyACM0")
+    look, write = (command for command, _ in flasher.calls)
+    assert "-n" in look  # writes nothing
+    assert "-U" not in look
+    assert write[-2:] == ["-U", "flash:w:atmega2560-pair.hex:i"]
+    assert "-V" not in write  # which would leave reading back out
+    assert "what is on it is lost" in asked[0]
+
+
+@pytest.mark.parametrize(
+    ("there", "why"),
+    [
+        ({}, r"no Arduino Mega 2560 is plugged in; look at its cable"),
+        ({"/dev/ttyS0": OTHER}, r"\(there are /dev/ttyS0, of other makers\)"),
+        ({"COM3": ARDUINO, "COM4": ARDUINO}, "at COM3, COM4; say which with --port"),
+    ],
+)
+def test_without_one_board_nothing_is_started(there, why):
+    flasher = Flasher()
+    with pytest.raises(BadInput, match=why):
+        flashed(flasher, there=there)
+    assert not flasher.calls
+
+
+def test_a_board_that_does_not_answer_is_left_within_seconds():
+    flasher = Flasher(1)
+    with pytest.raises(RigStopped, match=r"No Arduino Mega 2560 answers at COM3: avrdude: ser_open\(\): can't open"):
+        flashed(flasher, port="COM3")
+    assert flasher.calls[0][1] <= 10.0
+
+
+def test_a_no_writes_nothing():
+    flasher = Flasher(0)
+    with pytest.raises(RigStopped, match="Nothing was written"):
+        flashed(flasher, port="COM3", hand=lambda _: False)
+    assert len(flasher.calls) == 1
+
+
+def test_an_image_that_is_not_read_back_as_it_was_written_is_told():
+    with pytest.raises(RigStopped, match="not written whole"):
+        flashed(Flasher(0, 1), port="COM3")
+
+
+def test_a_program_that_does_not_end_is_ended():
+    done = in_time([sys.executable, "-c", "while True: pass"], 0.3)
+    assert done.returncode == 1
+    assert "did not end within 0.3 s" in done.stderr
+
+
+def test_without_the_flasher_it_is_named(monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda tool: None)
+    with pytest.raises(BadInput, match="sudo apt install avrdude"):
+        flashed(Flasher(), port="COM3")

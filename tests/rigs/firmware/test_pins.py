@@ -1,0 +1,46 @@
+"""Are the wires that are told those of the board, and are all of them drawn?"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import pytest
+
+from upright.rigs.firmware import BOARDS, pins, wiring
+
+EVERY = [(board, drive) for board in BOARDS.values() for drive in board.drives]
+MEGA = {
+    0: "PE0", 1: "PE1", 4: "PG5", 6: "PH3", 7: "PH4", 8: "PH5", 9: "PH6", 10: "PB4", 11: "PB5", 12: "PB6", 13: "PB7",
+    51: "PB2", 52: "PB1", 53: "PB0",
+}  # fmt: skip
+"""Arduino's own table, ArduinoCore-avr, variants/mega/pins_arduino.h."""
+
+
+@pytest.mark.parametrize(("board", "drive"), EVERY, ids=lambda v: getattr(v, "name", v))
+def test_no_pin_has_two_wires_and_every_rig_has_what_it_needs(board, drive):
+    wires = pins(board, drive)
+    assert len({pin.number for pin in wires}) == len(wires)
+    assert {"ENCODER_1_A", "ENCODER_1_B", "ENCODER_2_A", "ENCODER_2_B", "POWER_STAGE"} <= {p.signal for p in wires}
+    assert {"analog": {"SCLK", "SDI", "SYNC"}, "pair": {"FORWARD", "REVERSE"}, "sign": {"PWM", "SIDE_A", "SIDE_B"}}[
+        drive
+    ] <= {p.signal for p in wires}
+
+
+@pytest.mark.parametrize("drive", BOARDS["atmega2560"].drives)
+def test_numbers_on_a_mega_are_arduino_s(drive):
+    for pin in pins(BOARDS["atmega2560"], drive):
+        assert MEGA[pin.number] == pin.name
+
+
+@pytest.mark.parametrize(("board", "drive"), EVERY, ids=lambda v: getattr(v, "name", v))
+def test_every_wire_is_drawn_between_its_pin_and_its_terminal(board, drive):
+    wires = pins(board, drive)
+    root = ET.fromstring(wiring(board, drive, wires))
+    kind = "{http://www.w3.org/2000/svg}"
+    texts = {(t.text, float(t.get("y"))): t for t in root.iter(f"{kind}text")}
+    heights = {float(line.get("y1")) for line in root.iter(f"{kind}line")}
+    assert all(line.get("y1") == line.get("y2") for line in root.iter(f"{kind}line"))
+    for pin in wires:
+        (y,) = [at for text, at in texts if text == f"{pin.number}  {pin.name}"]
+        assert (pin.terminal, y) in texts
+        assert any(abs(height - y) < 6 for height in heights)  # of letters
