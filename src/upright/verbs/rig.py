@@ -75,7 +75,7 @@ def run(
     check : bool
         Compare a small pulse with the model first.
     watch : bool
-        Look for faulty encoders beside the loop, by a bank of Kalman filters.
+        Tell wrong encoders and a weak drive from hands and friction beside the loop.
     accept : str, optional
         Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
         not armed.
