@@ -107,7 +107,12 @@ def parse_if_given(text: str, expected: str) -> float | None:
 
 def in_unit(value: float | str, unit: str) -> float:
     """Number in `unit`: a text is converted, a plain number is taken to be in it."""
-    return parse(value, unit) / scale(unit) if isinstance(value, str) else float(value)
+    if isinstance(value, str):
+        return parse(value, unit) / scale(unit)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise BadInput(f"A number in {unit or '1'} was needed, or a text with its unit, got {value!r:.40}.") from None
 
 
 def uncertainty(text: str, value: float, unit: str) -> float:
