@@ -32,7 +32,7 @@ def measured(item: tuple[str, int]) -> tuple[str, bool, int, int]:
         rig = live_stand(folder / "RIG.toml")
         fit = run_at_once(rig, folder / "1b", lambda _step, _share: None).fit
     numbers = [*rig.twin.plant.parameters(), "actuator.gain"]
-    firm = [(rig.truth[n], e) for n, e in fit.estimates.items() if e.status == "firm" and n in numbers]
+    firm = [(rig.truth[n], e) for n, e in fit.estimates.items() if e.status == "well determined" and n in numbers]
     return make, fit.trusted, sum(e.interval[0] <= t <= e.interval[1] for t, e in firm), len(firm)
 
 

@@ -238,7 +238,9 @@ def met(source: Source, dialect: str) -> Contact:
     fit = done["identify"]
     held, design = done.get("design", (None, said))
     assumed = {n for n, v in drafted["parameters"].items() if isinstance(v, dict) and v.get("assumed")}
-    usable = {n: e.value for n, e in fit.estimates.items() if fit.trusted and e.status == "firm" and not e.rests_on}
+    usable = {
+        n: e.value for n, e in fit.estimates.items() if fit.trusted and e.status == "well determined" and not e.rests_on
+    }
     truth = _meant(source.truth, assumed) if source.plant == contact.plant else {}
     wrong = tuple(n for n, value in usable.items() if _misses(fit.estimates[n], value, truth.get(n)))
     first, last = moving(source)

@@ -252,7 +252,7 @@ def _identified(done: Kept, made: Twin, drafted: dict[str, Any], log: Path) -> K
         fit = up.identify(up.read(log), made.source.plant, known=known)
     except UprightError as error:
         return _with(done, said=f"{done.said}; {str(error).splitlines()[0]}")
-    usable = {n: e for n, e in fit.estimates.items() if e.status == "firm" and not n.startswith(UNASKED)}
+    usable = {n: e for n, e in fit.estimates.items() if e.status == "well determined" and not n.startswith(UNASKED)}
     held = {n: e.interval[0] <= truth.get(n, 0.0) <= e.interval[1] for n, e in usable.items()}
     return _with(done, identified=True, trusted=fit.trusted, held=held)
 

@@ -183,7 +183,7 @@ def told(done: dict[str, tuple[list[Outcome], Spread]]) -> list[Line]:
         lines += [_line(f"{plant}: {what}", hits, seconds) for what, hits in tally.items()]
         for what, hits in tally.items():
             every.setdefault(what, []).extend(hits)
-        firm = [s == "firm" for o in outcomes for s in o.status.values()]
+        firm = [s == "well determined" for o in outcomes for s in o.status.values()]
         trusted = [o for o in outcomes if o.trusted]
         hits = [hit for o in trusted for hit in o.held.values()]
         note = f"{len(trusted)} of {len(outcomes)} fits trusted, {sum(firm)} of {len(firm)} numbers firm; "

@@ -88,8 +88,8 @@ def answered(case: Case) -> Told:
     came = predict(fit, rig, [logged(make, "other", "predict", u2[:length], y2[:length])])["other"].fit_percent
     told: Told = [(predicts.question, predicts.answer, min(came.values()) >= GOOD)]
     for n, e in fit.estimates.items():
-        if e.status in ("firm", "weak", "at bound", "unseen"):
-            usable = e.status == "firm" and fit.trusted
+        if e.status in ("well determined", "poorly determined", "at bound", "unseen"):
+            usable = e.status == "well determined" and fit.trusted
             near = abs(e.value / case.truth[n] - 1)
             holds = e.interval[0] <= case.truth[n] <= e.interval[1] or near <= USEFUL
             told.append(("Can its numbers be used?", "yes" if usable else "no", holds if usable else near <= CLOSE))

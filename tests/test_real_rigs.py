@@ -80,5 +80,5 @@ def test_a_run_that_excites_itself_is_named_and_left_out(tmp_path):
     assert not any(w.startswith("Outlier") for w in clean.warnings)
     assert fit.runs["9:26"].role == "predict"
     for name, e in clean.estimates.items():
-        if e.status == "firm":
+        if e.status == "well determined":
             assert e.interval[0] <= fit.estimates[name].value <= e.interval[1], name

@@ -232,7 +232,7 @@ def met(rig: Stranger) -> Ending:
         off = {n: e.value / true[n] for n, e in fit.estimates.items() if true.get(n)}
         missed = tuple(
             n for n, e in fit.estimates.items()
-            if fit.trusted and e.status == "firm" and not e.rests_on and n in true
+            if fit.trusted and e.status == "well determined" and not e.rests_on and n in true
             and not e.interval[0] <= true[n] <= e.interval[1]
         )  # fmt: skip
         return Ending(

@@ -52,7 +52,7 @@ class Declared(Mapping[str, T]):
     group : str
         Entry points that declare more of them.
     own : callable
-        This package's by name, asked once, when it is first needed.
+        This package's by name, collected once, when first needed.
     accepts : callable
         Whether an object is one of them.
     """

@@ -19,7 +19,7 @@ class ImpossiblePhysics(UprightError, ValueError):
 
 
 class NotIdentifiable(UprightError, RuntimeError):
-    """The data cannot answer the question asked."""
+    """The data cannot answer this question."""
 
 
 class RigStopped(UprightError, RuntimeError):

@@ -9,7 +9,7 @@ Progress = Callable[[str, float], None]
 
 
 def silent(step: str, share: float) -> None:
-    """Take note of nothing; what runs when nobody asked to be told."""
+    """Ignore progress; the default."""
 
 
 def part(progress: Progress, start: float, stop: float, what: str) -> Progress:

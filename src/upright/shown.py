@@ -10,7 +10,7 @@ class Shown:
     """A value that can be looked at: short as text, as a table in a notebook, as a picture.
 
     What it looks like is not said here, since a value knows no report and no figure; the front door says who does
-    (`look_with`), and that is asked when a value is first shown.
+    (`look_with`), which is called when a value is first shown.
     """
 
     __slots__ = ()

@@ -87,7 +87,7 @@ def _met() -> set[str]:
 
 
 def _remember(*digests: str) -> None:
-    """Empty files called after the digests; where no folder can be written to, it is said again next time."""
+    """Empty files called after the digests; without a writable folder the announcement comes again next time."""
     _SINCE_START.update(digests)
     with suppress(OSError):
         _folder().mkdir(parents=True, exist_ok=True)

@@ -72,7 +72,7 @@ def parse(text: str, expected: str = "") -> float:
     text : str
         A number and its unit.
     expected : str, optional
-        Unit of the quantity asked for, such as ``"kg m^2"``; any unit of the same dimension is accepted.
+        Expected unit, such as ``"kg m^2"``; any unit of the same dimension is accepted.
         Without it every unit is.
 
     Raises

@@ -34,7 +34,7 @@ def study(tmp_path: Path) -> Path:
 def fit_file(folder: Path, stderr: float) -> Path:
     """A fit of the same rig on a drive of 0.5 N m/V, whose gain is known to `stderr`."""
     entries = {n: {"value": v, "stderr": 0.0, "unit": "", "status": "known"} for n, v in RIG.parameters().items()}
-    entries["actuator.gain"] = {"value": 0.5, "stderr": stderr, "unit": "N m/V", "status": "firm"}
+    entries["actuator.gain"] = {"value": 0.5, "stderr": stderr, "unit": "N m/V", "status": "well determined"}
     content = {
         "format": 1, "plant": "furuta", "verdict": "", "trusted": True, "parameters": entries,
         "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": {"entries": {

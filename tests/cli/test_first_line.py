@@ -52,7 +52,7 @@ def fit_of(key: str, folder: Path, said: dict[str, Any]) -> Path:
     names = {"linear": "cart-pendulum", "furuta": "furuta", "rectilinear": "rectilinear-2"}
     entries = {n: {"value": v, "stderr": 0.0, "unit": "", "status": "known"} for n, v in rig.plant.parameters().items()}
     unit = "N m/V" if key == "furuta" else "N/V"
-    entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": unit, "status": "firm"}
+    entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": unit, "status": "well determined"}
     vendor = "ECP 205" if key == "furuta" else "ECP 210"
     content = {
         "format": 1, "plant": names[key], "parameters": entries, "estimated": ["actuator.gain"],

@@ -21,7 +21,12 @@ def fit(tmp_path: Path) -> Path:
     """A fit that found the cart as designed, its drive's gain known to one percent."""
     rig = make_rig("linear")
     entries = {n: {"value": v, "stderr": 0.0, "unit": "", "status": "known"} for n, v in rig.plant.parameters().items()}
-    entries["actuator.gain"] = {"value": rig.gain, "stderr": 0.01 * rig.gain, "unit": "N/V", "status": "firm"}
+    entries["actuator.gain"] = {
+        "value": rig.gain,
+        "stderr": 0.01 * rig.gain,
+        "unit": "N/V",
+        "status": "well determined",
+    }
     content = {
         "format": 1, "plant": "cart-pendulum", "verdict": "", "trusted": True, "parameters": entries,
         "estimated": ["actuator.gain"], "correlation": [[1.0]], "rig": {"vendor": "ECP 210"},

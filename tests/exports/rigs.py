@@ -23,7 +23,7 @@ def fit_file(
     entries = {n: {"value": v, **known} for n, v in values.items()}
     entries["actuator.gain"]["unit"] = f"{unit}/V"
     for n, error in stderr.items():
-        entries[n] |= {"stderr": error, "status": "firm"}
+        entries[n] |= {"stderr": error, "status": "well determined"}
     content = {
         "format": 1, "plant": name, "verdict": "", "trusted": True, "parameters": entries,
         "estimated": list(stderr), "correlation": np.eye(len(stderr)).tolist(),

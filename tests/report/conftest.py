@@ -45,16 +45,22 @@ def make_fit():
         },
     }
     estimates = {
-        n: Estimate(value=v, stderr=0.02 * v, interval=(0.96 * v, 1.04 * v), unit=parameters[n].unit, status="firm")
+        n: Estimate(
+            value=v, stderr=0.02 * v, interval=(0.96 * v, 1.04 * v), unit=parameters[n].unit, status="well determined"
+        )
         for n, v in zip(names, values, strict=True)
     }
-    estimates["b_2"] = Estimate(value=1.4e-5, stderr=9e-5, interval=(0.0, math.inf), unit="N m s/rad", status="weak")
+    estimates["b_2"] = Estimate(
+        value=1.4e-5, stderr=9e-5, interval=(0.0, math.inf), unit="N m s/rad", status="poorly determined"
+    )
     rng = np.random.default_rng(3)
     basis = np.linalg.qr(rng.normal(size=(6, 6)))[0]
     correlation = np.eye(6)
     correlation[2, 4] = correlation[4, 2] = -0.94
     correlation[0, 1] = correlation[1, 0] = 0.31
-    initial = {"theta": Estimate(value=1.5, stderr=0.002, interval=(1.496, 1.504), unit="rad", status="firm")}
+    initial = {
+        "theta": Estimate(value=1.5, stderr=0.002, interval=(1.496, 1.504), unit="rad", status="well determined")
+    }
     return Fit(
         model=GreyBox(plant=Furuta, parameters=parameters),
         estimates=estimates,

@@ -80,7 +80,8 @@ def test_the_numbers_of_a_fit_stand_on_its_page_with_their_units(tmp_path):
         assert value(row["std. error"]) == pytest.approx(e.stderr, rel=5e-2)
         ends = [value(end) for end in row["95 % interval"].split(" to ")]
         assert ends == pytest.approx(e.interval, rel=1e-3, abs=0.0)
-        assert (row["unit"], row["status"]) == (e.unit.replace("^2", "²"), e.status)
+        assert row["unit"] == e.unit.replace("^2", "²")
+        assert row["status"].startswith(e.status)
 
 
 def test_the_gains_on_the_page_are_those_of_the_program_that_closed_the_loop(tmp_path):

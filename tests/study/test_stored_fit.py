@@ -15,7 +15,14 @@ from upright.study.stored_rig import read_stored_rig
 
 def number(value, unit, stderr=0.0):
     around = [value - 2 * stderr, value + 2 * stderr]
-    return {"value": value, "stderr": stderr, "interval": around, "unit": unit, "status": "firm", "meaning": "..."}
+    return {
+        "value": value,
+        "stderr": stderr,
+        "interval": around,
+        "unit": unit,
+        "status": "well determined",
+        "meaning": "...",
+    }
 
 
 VALUES = {"m_c": 0.5, "m_p": 0.107, "l_cg": 0.23, "J_p": 1.6e-3, "b_1": 0.4, "b_2": 1e-4, "g": 9.81}

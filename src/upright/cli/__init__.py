@@ -1,7 +1,7 @@
 """Which commands does the tool answer to?
 
 Each is a function in `upright/verbs`, or in another package that names it as an entry point of the group
-``upright.commands``; `cli.build` makes a command of it when it is asked for.
+``upright.commands``; `cli.build` makes a command of it when it is called.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def elsewhere() -> dict[str, Any]:
 
 
 class Commands(TyperGroup):
-    """The commands by their names; one is built when it is asked for. Of ``log show``, `log` is such a group itself."""
+    """The commands by their names; one is built when it is called. Of ``log show``, `log` is such a group itself."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -207,7 +207,7 @@ def _any_terminal() -> None:
 
 
 def _flush() -> None:
-    """Write what is still waiting; a reader that went away is no error, a full disk is said."""
+    """Write what is still waiting; a reader that closed is no error, a full disk is reported."""
     try:
         sys.stdout.flush()
     except OSError as error:

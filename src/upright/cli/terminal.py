@@ -1,4 +1,4 @@
-"""What commands share: the console, a bar while they work, and the end of each, where the answer is told."""
+"""What commands share: the console, a bar while they work, and how each prints its answer."""
 
 from __future__ import annotations
 

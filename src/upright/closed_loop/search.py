@@ -233,7 +233,7 @@ class Search:
                 best = fit(self.signals, plain, self.u, self.used, self.dropped(best))
 
     def limited(self, best: Regression) -> Rows:
-        """Rows where the law asked for more than the command's largest or less than its smallest value."""
+        """Rows where the law is saturated: beyond the command's largest or smallest value."""
         slack = 3 * best.missed + 1e-9 * float(np.ptp(self.u[_JUNK:]))
         out = np.zeros(self.u.size, dtype=bool)
         for at, side in ((self.high, 1.0), (self.low, -1.0)):

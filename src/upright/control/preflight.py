@@ -1,7 +1,7 @@
-"""Will this law hold that rig? Asked of the model, before anything moves.
+"""Will this law stabilise that rig? Predicted by the model, before anything moves.
 
 Margins and noise come from the linear sampled loop. Everything else is simulated on the nonlinear model as identified,
-with dry friction, encoder counts, converter, limit, delay and lag: the run that is asked for, the same run on every rig
+with dry friction, encoder counts, converter, limit, delay and lag: the run that is requested, the same run on every rig
 that the identification allows, and how far the pendulum may lean or be tapped.
 """
 
@@ -35,7 +35,7 @@ WORDS = (STABILISED, SATURATED, BUSY, "does not settle", "leaves its travel", "f
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What a law is asked to do.
+    """What a law has to do.
 
     Attributes
     ----------

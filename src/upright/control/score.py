@@ -1,7 +1,7 @@
 """Figures of runs, defined once, for what is predicted and for what happened; of one, or of many side by side.
 
 Dry friction stops a body beside its reference and an encoder shows steps: the motion is measured against where it came
-to rest, what is missing there is told apart, and a band narrower than the encoder's steps is widened to them.
+to rest, what is missing there is reported separately, and a band narrower than the encoder's steps is widened to them.
 """
 
 from __future__ import annotations
@@ -288,7 +288,7 @@ class StepFigures:
         After which it stays within 2 or 5 % of the change about its rest; inf where the record ends before it is
         known to stay.
     arrival : float
-        After which it stays within 5 % of the step asked for about the reference itself; inf where friction or
+        After which it stays within 5 % of the requested step about the reference itself; inf where friction or
         swinging keep it from there.
     error : float
         Reference less rest.

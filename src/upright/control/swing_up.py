@@ -99,7 +99,7 @@ def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
 TRAVEL = {"m": 0.20, "rad": 2 * math.pi}
 """How far the driven body may go from the middle where the rig does not say: a rail's half, one turn of a cable."""
 NEAR = 0.5
-"""Angle from upright [rad] beyond which the linear model is not asked: sin 0.5 is 4 % below 0.5."""
+"""Angle from upright [rad] beyond which the linear model is not used: sin 0.5 is 4 % below 0.5."""
 AWAY = 0.7
 """Angle from upright [rad] at which the pendulum counts as fallen and is swung up again."""
 FADE = 0.01

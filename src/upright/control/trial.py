@@ -91,7 +91,7 @@ def trial(
         What disturbs the drive, added to the law's command before its limit, sample by sample.
     rest : array, shape (coordinates,), optional
         What the law takes for the readings at the equilibrium; without it the plant's own numbers, which the encoders
-        show when they were zeroed where the coordinates are zero and are scaled as said.
+        show when they were zeroed where the coordinates are zero and are scaled as described.
     off : float
         When the drive is switched off [s].
 

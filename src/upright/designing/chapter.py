@@ -84,7 +84,7 @@ def _delay_from(design: Designed) -> str:
 
 
 def _doubts(design: Designed) -> tuple[str, ...]:
-    """What was not said of the rig, and whose number stands for it."""
+    """What the rig's description leaves out, and which number stands for it."""
     if isinstance(design.rig, StateSpace):
         left = "dry friction, steps of encoders" + (
             "" if design.request.limit else ", the largest command of the drive"
@@ -118,7 +118,7 @@ def _gain_table(design: Designed) -> Table:
 
 
 def _pole_table(design: Designed) -> Table:
-    """Poles asked, attained by the gains on the continuous model, and of the loop as it runs."""
+    """Requested poles, those attained by the gains on the continuous model, and of the loop as it runs."""
     discrete = design.model.dt is not None
     rows = [("model, open loop", _outlasting(design, design.open_loop, 5) if discrete else written(design.open_loop))]
     if design.placement is not None:
@@ -296,7 +296,7 @@ def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
 
 
 def _pole_pictures(design: Designed) -> list[Picture]:
-    """Poles in the s-plane, and those of least cost as the effort's weight varies, a hundredfold either way."""
+    """Poles in the s-plane, and the LQR locus as the effort's weight varies, a hundredfold either way."""
     aim = "asked" if design.placement else "least cost"
     kinds = [
         Poles(name="model, open loop", values=_drawn(design, design.open_loop), mark="x", colour=BLACK),

@@ -36,7 +36,7 @@ def estimators(model: StateSpace) -> tuple[str, ...]:
 
 
 def chosen(model: StateSpace, speed: str) -> str:
-    """The way asked for, or the plainest where none was.
+    """The requested velocity estimator, or the plainest where none was.
 
     Raises
     ------

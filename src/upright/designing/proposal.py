@@ -1,4 +1,4 @@
-"""Which poles to begin with, where nobody asked for any?
+"""Proposed closed-loop poles, where none are requested.
 
 As fast as the rig falls, or swings where nothing falls, and somewhat slower or faster. Of those that hold as many of
 the rigs that a fit allows, whose start the drive can take, whose command is quiet at rest, and whose loop keeps nearly

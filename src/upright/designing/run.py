@@ -50,15 +50,16 @@ SPEEDS = ("plain", "filtered", "kalman")
 
 @dataclass(frozen=True, kw_only=True)
 class DesignRequest:
-    """What is asked of the loop; SI units, the limit in the command's.
+    """Request for a loop; SI units, the limit in the command's.
 
     `period` is that of the matrices where they are sampled.
     `delay` is how late a command acts in all [samples]: that of the rig's file when None, or one where it has none.
     `lag` is the drive's [s], that of the rig's file when None.
     `poles` [1/s] or `weights` (diagonal of Q, with `R`, or with the limit and `start` from which R follows).
     `speed` is one of `SPEEDS`, or a way that matrices allow, empty for the plainest; `memory` is the filter's. With
-    `sampled`, the gains are those whose sampled loop has the poles asked. `on` is the rig completed for a run, where
-    it is one. `proposed` is how many times as fast as the model itself proposed poles are; None of poles asked.
+    `sampled`, the gains are those whose sampled loop has the requested poles. `on` is the rig completed for a run,
+    where it is one. `proposed` is how many times as fast as the model itself proposed poles are; None where poles are
+    requested.
     """
 
     at: str
@@ -120,7 +121,7 @@ class Designed:
     `peak` is the largest command that the start takes with continuous feedback, `peak_sampled` in the loop as it runs;
     `swing` is that way back: t, outputs, commands.
     `holding` is simulated; None of plain matrices, without a limit, and where the linear loop falls.
-    K are the gains in force: the `continuous` ones of placement or least cost (`placement` is None then), or the
+    K are the gains in force: the `continuous` ones of placement or LQR (`placement` is None then), or the
     `sampled_gains`, whose poles are met in the loop as it runs.
     """
 
@@ -153,7 +154,7 @@ class Designed:
 
     @property
     def wanted(self) -> Roots:
-        """Poles asked for, or those of least cost."""
+        """Requested poles, or those of LQR."""
         if self.placement is not None:
             return self.placement.requested
         return _in_s(self.model, poles_of(self.model.A - self.model.B @ self.continuous))
@@ -218,7 +219,7 @@ class Designed:
 
 @one_thread()
 def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
-    """Gains as wished, and their loop as a computer runs it.
+    """Gains as requested, and their loop as a computer runs it.
 
     Parameters
     ----------
@@ -229,7 +230,7 @@ def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
     Raises
     ------
     BadInput
-        When what is asked cannot be had; the sentence says why.
+        When the request cannot be met; the sentence says why.
     """
     if isinstance(rig, StateSpace):
         model, sampled = _plain(rig), _held(_plain(rig), request)
@@ -310,7 +311,7 @@ def _in_s(model: StateSpace, poles: Roots) -> Roots:
 
 
 def _gains(model: StateSpace, request: DesignRequest, start: Array) -> tuple[Array, Placement | None, float | None]:
-    """Gains as wished, how their poles were placed, in s, or the weight of the effort."""
+    """Gains as requested, how their poles were placed, in s, or the weight of the effort."""
     A, B = model.A, model.B
     if request.poles is not None:
         placement = _placed_samples(model, request.poles) if model.dt is not None else place(A, B, request.poles)
@@ -351,7 +352,7 @@ def _way_back(model: StateSpace, K: Array, start: Array) -> tuple[Array, Array, 
 def _from_encoders(
     rig: Rig, model: StateSpace, sampled: StateSpace, request: DesignRequest
 ) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
-    """The way to the velocities that was asked for, all that a rig has, and the steps of its encoders."""
+    """The requested velocity estimator, all that a rig has, and the steps of its encoders."""
     resolution = request.resolution or tuple(
         completed(rig, needs=("counts",), who="upright design").resolution.tolist()
     )
@@ -419,7 +420,7 @@ def velocities(
     memory : float
         Of the filtered difference.
     limit : float
-        Largest command. For the Kalman filter every coordinate is shaken by itself as much as a tenth of it would:
+        Largest command. For the Kalman filter the process noise of every coordinate is what a tenth of it would cause:
         pushes, friction, what the model leaves out.
     resolution : float or array
         Step of each encoder [m or rad].

@@ -35,7 +35,7 @@ HELD = 0.2
 class Place:
     """A coordinate as it was measured: `y` (N,) and its `resolution` in `unit`, and the column it came from.
 
-    The unit is the coordinate's, or counts where nobody said how many make a turn or a metre.
+    The unit is the coordinate's, or counts where counts per turn or metre are not specified.
     """
 
     column: str
@@ -51,14 +51,15 @@ class Case:
     Attributes
     ----------
     record, inspection
-        The log, and what can be told about it before any model.
+        The log, and what is known about it before any model.
     plant : type of Plant or None
     rig : Rig or None
-        With the numbers that are known; None where only the plant's name is, or nobody said which column is what.
+        With the numbers that are known; None where only the plant's name is, or the wiring of its columns is not
+        specified.
     places : mapping of str to Place
         Measured coordinates.
     zeroed : bool
-        Whether somebody said where each coordinate is zero, rather than the record.
+        Whether each coordinate's zero is specified, rather than taken from the record.
     drive : str
         Column of the effort; empty when there is none.
     u : (N,) array

@@ -20,7 +20,7 @@ from upright.signals.trips import TripRegression
 from upright.study.draft.recognise import drive_column
 
 STILL = 0.1
-"""Seconds at the beginning in which a rig must lie still before its first motion can be told."""
+"""Seconds at the beginning in which a rig must lie still before its first motion can be detected."""
 
 
 def examine_effort(case: Case) -> list[Finding]:

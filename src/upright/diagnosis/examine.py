@@ -22,7 +22,7 @@ from upright.study.draft.suits import plants_that_suit
 from upright.study.sensors import Wiring
 
 HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
-"""Findings after which equations of motion are not asked, because they would only say the same again."""
+"""Findings after which equations of motion are not evaluated: they would only repeat them."""
 
 
 def examine(

@@ -71,7 +71,7 @@ class Finding:
     left: float = 0.0
     """What stays unexplained once this is acted on [%], where that was computed."""
     spoils: bool = True
-    """Whether so much of the record is touched that equations of motion need not be asked."""
+    """Whether so much of the record is touched that equations of motion need not be evaluated."""
 
 
 KINDS = {
@@ -103,7 +103,8 @@ KINDS = {
 class Diagnosis:
     """All findings about one record, worst first; what was looked for; what could not be looked for, and why.
 
-    `rig` is what was said of it; where nothing was, `rigs` are the plants whose coordinates its columns can measure.
+    `rig` is how it was described; without a description, `rigs` are the plants whose coordinates its columns can
+    measure.
     """
 
     file: str

@@ -1,7 +1,7 @@
 """Do effort and motion obey the rig's equations? Signs, scales, silent trips, an effort that is none.
 
 The force that each equation of motion needs, ``M(q) a - f(q, v)``, is computed from the measured motion; what friction
-and the effort leave of it must be little. Then it is asked whether one sensor or the effort, times some factor, would
+and the effort leave of it must be little. Then it is tested whether one sensor or the effort, times some factor, would
 leave far less. No simulation, and no friction has to be known: it is regressed.
 """
 

@@ -1,4 +1,4 @@
-"""What does the rig do when nothing is asked of it? Creeping held bodies, drifting rest, oscillation that grows."""
+"""What does the rig do without a command? Creeping held bodies, drifting rest, oscillation that grows."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class ExperimentResult:
 
 @dataclass(kw_only=True, eq=False)
 class Session:
-    """What has been told so far; it is filled experiment by experiment, so that an interrupted one can be reported."""
+    """Results so far; they are filled in experiment by experiment, so that an interrupted one can be reported."""
 
     make: str
     seed: int
@@ -81,7 +81,7 @@ class Session:
         return _needs(e, self.make, self.live)
 
     def make_for(self, e: Experiment) -> str:
-        """Make on whose twin an experiment is run, or what the live rig is asked for by."""
+        """Make on whose twin an experiment is run, or the name of the live rig."""
         return self.make if self.live is not None else e.make(self.make)
 
     def stand(self, make: str) -> TestStand:
@@ -93,12 +93,12 @@ class Session:
 
     @property
     def missing(self) -> tuple[Experiment, ...]:
-        """What was asked for and not begun."""
+        """What was requested and not begun."""
         return tuple(e for e in self.requested if e.key not in {t.experiment.key for t in self.results})
 
 
 def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
-    """The experiments asked for, with those whose numbers they take; all that the rig has when none is named.
+    """The requested experiments, with those whose numbers they take; all that the rig has when none is named.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def run_laboratory(
     folder : Path
         Takes a folder for each experiment. What is there and still holds is not made again.
     progress : callable, optional
-        Told the step at work and the share of the whole.
+        Called with the current step and the share of the whole.
     stopped : callable, optional
         Whether Ctrl-C was pressed, for what has swallowed it.
     fresh : bool
@@ -184,7 +184,7 @@ def run_laboratory(
     nonideal : bool
         Take twins with physics that models leave out; see `upright.experiments.nonideal`.
     live : LiveStand, optional
-        The rig itself, where it is no twin that is simulated here; `make` is then what it is asked for by.
+        The rig itself, where it is no twin that is simulated here; `make` is then its name.
 
     Raises
     ------
@@ -301,7 +301,7 @@ def _stored(folder: Path, digest: str) -> Chapter | None:
 
 
 def _with_stored(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
-    """What was told, and what else is there from an earlier run on the same rig."""
+    """The results, and what else is stored of an earlier run on the same rig."""
     results = {t.experiment.key: t for t in session.results}
     for e in session.there:
         stored = (

@@ -1,4 +1,4 @@
-"""The experiments of the paper, each told once: what it needs of a rig, and how it is made on whichever test stand."""
+"""The experiments of the paper, each declared once: what it needs of a rig, and how any test stand runs it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from upright.rig.makes import MAKES, PENDULUMS, SHAFTS
 
 @dataclass(frozen=True, kw_only=True)
 class ExperimentInput:
-    """What an experiment is given: test stand and folder, what finished ones it builds on said and where they wrote."""
+    """What an experiment is given: test stand and folder, results and folders of those it builds on."""
 
     stand: TestStand
     seed: int
@@ -63,7 +63,7 @@ class Experiment:
     Attributes
     ----------
     key : str
-        As it is asked for and as its folder is named.
+        Its name on the command line and of its folder.
     part_of : str
         Asking for this brings it as well: ``1`` means 1a and 1b.
     title : str
@@ -90,7 +90,7 @@ class Experiment:
     tell: Callable[[ExperimentInput], tuple[Chapter, bool]]
 
     def make(self, requested: str) -> str:
-        """Make that it is run on where one is asked for, or none."""
+        """Rig model that it is run on where one is requested, or none."""
         return requested if requested in self.makes else self.makes[0]
 
 
@@ -181,7 +181,7 @@ def _carries_pendulum(stand: TestStand) -> bool:
 
 
 def _is_shaft(stand: TestStand) -> bool:
-    return any(isinstance(stand.rig.plant, type(MAKES[key].plant)) for key in SHAFTS)
+    return any(isinstance(stand.rig.plant, type(MAKES[key].rig.plant)) for key in SHAFTS)
 
 
 EXPERIMENTS: tuple[Experiment, ...] = (
@@ -212,4 +212,4 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         seconds=9.0, tell=_free_swing,
     ),
 )  # fmt: skip
-"""In the order in which they are run and told."""
+"""In the order in which they are run and reported."""

@@ -36,6 +36,8 @@ class SampledController:
         How late a command acts, as the design assumed [samples].
     basis : Basis
         What the law was designed from.
+    log_zeros : tuple of str
+        Readings whose zero the study states, of the session of its log.
     """
 
     law: Law | Rule
@@ -49,6 +51,7 @@ class SampledController:
     states_from: str = ""
     delay: float | None = None
     basis: Basis = DESCRIBED
+    log_zeros: tuple[str, ...] = ()
 
     @property
     def linear(self) -> Law:
@@ -71,6 +74,18 @@ class SampledController:
         """Step of each encoder, 0 for none."""
         return np.broadcast_to(np.asarray(self.law.resolution, dtype=np.float64), (len(self.readings),))
 
+    def _zeroing(self) -> str:
+        """Where the readings count from: a counter begins anew wherever its power comes on, as in no log before."""
+        if not self.encoder.any():
+            return ""
+        zeroing = "Encoders count from where they are switched on: zero them at rest, a pendulum hanging, before a run."
+        if self.log_zeros:
+            zeroing += (
+                f" The zeros of {' and '.join(self.log_zeros)} that the study states are those of its log's session; "
+                "they are not in this program."
+            )
+        return zeroing
+
     @property
     def facts(self) -> list[str]:
         """What a reader of the program has to know, a sentence each."""
@@ -81,6 +96,7 @@ class SampledController:
             *filter(None, [harmless(self.basis.first_line())]),
             f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
+            *filter(None, [self._zeroing()]),
             f"Commands: {', '.join(self.commands)}{unit}; "
             + (f"none beyond {self.law.limit!r}" if math.isfinite(self.law.limit) else "NO LIMIT WAS SAID")
             + (f", in steps of {self.converter.max():g}." if self.converter.any() else ", not rounded."),
@@ -168,12 +184,59 @@ def of_design(content: Any, source: str) -> SampledController:
         raise BadInput(f"{source} does not hold a law ({error}); {AGAIN}.") from None
 
 
+def of_swing_up(content: Any, source: str) -> SampledController:
+    """The swing-up and catch of `swing_up.json`, a `Rule` with its limit.
+
+    Parameters
+    ----------
+    content : mapping
+        What the file holds.
+    source : str
+        As it was called, for sentences about it.
+
+    Raises
+    ------
+    BadInput
+        When it holds no rule, as older versions wrote it, or its pendulum was not caught.
+    """
+    again = "write it again with `upright swing-up ... -o FOLDER`"
+    if not isinstance(content, Mapping) or not {"rule", "readings", "period", "limit"} <= content.keys():
+        raise BadInput(f"{source} is no swing_up.json with a law; {again}.")
+    if not (content.get("swing_up") or {}).get("held"):
+        raise BadInput(
+            f"the swing-up of {source} did not end upright, so it is not exported: {content.get('verdict', '')}"
+        )
+    try:
+        readings, rule = list(content["readings"]), of_values(content["rule"])
+        if not isinstance(rule, Rule) or len(rule.measured) != len(readings):
+            raise ValueError(f"it needs a rule of {len(readings)} readings")
+        return SampledController(
+            law=replace(rule, period=float(content["period"]), limit=float(content["limit"])),
+            commands=("u",), command_unit=harmless(str(content.get("command_unit") or "")),
+            title=harmless(f"{content.get('rig', 'a rig')}, swing-up and catch"), **_signals(content),
+            states_from="filtered differences", basis=of_plain(content.get("basis"), "this swing-up"),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise BadInput(f"{source} does not hold a law ({error}); {again}.") from None
+
+
+def _signals(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Names, units and signs of the readings that a file holds, and whose zeros its study states."""
+    readings, entries = list(content["readings"]), (content.get("described") or {}).get("entries", {})
+    names = tuple(str(r["name"]) for r in readings)
+    return {
+        "readings": tuple(map(harmless, names)),
+        "reading_units": tuple(harmless(str(r["unit"])) for r in readings),
+        "signs": tuple(float(entries.get(f"sign.{n}", {}).get("value", 1.0)) for n in names),
+        "log_zeros": tuple(harmless(n) for n in names if entries.get(f"offset.{n}", {}).get("value", 0.0)),
+    }
+
+
 def _read(content: Mapping[str, Any]) -> SampledController:
     designed, readings, limit = of_values(content["law"]), list(content["readings"]), content["limit"]
     if not isinstance(designed, Law) or designed.readings != len(readings):
         raise ValueError(f"it needs matrices for {len(readings)} readings")
     names, others = tuple(str(r["name"]) for r in readings), designed.D.shape[1] - len(readings)
-    described = (content.get("described") or {}).get("entries", {})
     law = replace(
         designed, measured=names, reference_names=designed.reference_names or ("reference",) * others,
         period=float(content["period"]), limit=math.inf if limit is None else float(limit),
@@ -182,10 +245,8 @@ def _read(content: Mapping[str, Any]) -> SampledController:
     )  # fmt: skip
     at = f" at '{content['at']}'" if content.get("at") else ""
     return SampledController(
-        law=law, readings=tuple(map(harmless, names)), reading_units=tuple(harmless(str(r["unit"])) for r in readings),
-        commands=(harmless(content["command"]),), references=law.reference_names,
+        law=law, **_signals(content), commands=(harmless(content["command"]),), references=law.reference_names,
         command_unit=harmless(str(content.get("command_unit") or "")),
-        signs=tuple(float(described.get(f"sign.{n}", {}).get("value", 1.0)) for n in names),
         title=harmless(f"{content.get('plant', 'a rig')}{at}"),
         states_from=harmless(str(content.get("states_from", ""))),
         delay=content.get("delay_samples"), basis=of_plain(content.get("basis"), "this design"),

@@ -16,7 +16,7 @@ from upright.simulation import Held, simulate
 SAMPLES = 48
 """Few enough for the 2 kB of a small microcontroller, enough for every memory to be filled and the limit to be met."""
 BEYOND = 1.5
-"""Largest command asked for, in limits, so that some samples are limited and most are not."""
+"""Largest requested command, in limits, so that some samples are limited and most are not."""
 SINGLE = 2.0**-24
 """Unit roundoff of IEEE single precision."""
 

@@ -1,6 +1,6 @@
 """Which plant and which weights stand behind published sets of poles? Spectral factorization, read backwards.
 
-Poles p of least cost satisfy ``p(s) p(-s) = a(s) a(-s) + N(s)/R`` with the plant's a, N from the weights of the states
+LQR poles p satisfy ``p(s) p(-s) = a(s) a(-s) + N(s)/R`` with the plant's a, N from the weights of the states
 and R the weight of the effort; all three products are polynomials in ``w = s^2``. Sets that differ in R alone lie on
 one locus, and a few of them tell a and N/R.
 """

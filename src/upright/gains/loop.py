@@ -45,7 +45,7 @@ def closed(model: StateSpace, law: Law, gain: float = 1.0) -> Array:
 
 
 def place_sampled(model: StateSpace, estimator: Estimator, poles: ArrayLike) -> Array:
-    """Gains on *estimated* states that put as many poles of the sampled loop as there are gains exactly where asked.
+    """Gains on *estimated* states that put as many poles of the sampled loop as there are gains exactly as requested.
 
     With G(z) from the command to the estimated states, held, late and differenced as they are, z is a pole of the loop
     where ``K G(z) = -1``: one linear equation for K per pole, its derivatives for a pole that repeats. The remaining

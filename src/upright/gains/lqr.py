@@ -14,7 +14,7 @@ from upright.laws.linear import Array
 
 
 class LeastCost(NamedTuple):
-    """Gains of least cost, named as python-control's `lqr` returns them.
+    """LQR gains, named as python-control's `lqr` returns them.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class LeastCost(NamedTuple):
 def lqr(A: ArrayLike, B: ArrayLike, Q: ArrayLike, R: ArrayLike, *, states: Sequence[str] = ()) -> Array:
     """Gains K, shape (m, n), of ``u = -K x`` that of all that stabilize have the least integral of ``x'Q x + u'R u``.
 
-    Q is a matrix or the diagonal of one, R a number or a matrix; `states` are names for what is said of them.
+    Q is a matrix or the diagonal of one, R a number or a matrix; `states` are their names, for messages.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def _dies_out(poles: Roots, sampled: bool) -> NDArray[np.bool_]:
 
 
 def _why_none(A: Array, B: Array, Q: Array, sampled: bool, states: Sequence[str]) -> str:
-    """Why no gains of least cost stabilize: a mode that stays or grows is out of reach, or costs nothing."""
+    """Why no LQR gains stabilise: a mode that stays or grows is out of reach, or costs nothing."""
     n = A.shape[0]
 
     def stays(p: complex) -> bool:

@@ -73,7 +73,7 @@ def eigenvalues(A: Array, B: Array, K: Array) -> Roots:
 
 
 MISSED = 1e-6
-"""Poles farther from those asked than this part of the fastest are refused; the m-th root of it where m coincide,
+"""Poles farther from the requested ones than this part of the fastest are refused; its m-th root where m coincide,
 since a change of e in a coefficient moves an m-fold root by e^(1/m)."""
 ILL = 1e8
 """Condition from which half of the sixteen digits are gone."""
@@ -87,7 +87,7 @@ class Placement:
     ----------
     K : array, shape (inputs, states)
         Gains, in the input's unit per unit of the state.
-    asked, attained : arrays, shape (states,)
+    requested, attained : arrays, shape (states,)
         Poles wanted and eigenvalues of ``A - B K`` beside them [1/s]; K is rounded to double, the eigenvalues are not.
     miss : float
         Largest distance between the two [1/s].
@@ -127,7 +127,7 @@ class _Balanced:
 
 
 def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
-    """State feedback that puts the poles of ``x' = (A - B K) x`` where they are asked.
+    """State feedback that puts the poles of ``x' = (A - B K) x`` where they are requested.
 
     One input: Ackermann's formula on the balanced model, in 60 digits. Several: scipy's `place_poles`, or Ackermann's
     formula through one mixture of the inputs when more poles coincide than there are inputs. Either way the poles are
@@ -239,7 +239,7 @@ def _mixture(A: Array, B: Array) -> Array:
 
 
 def _allowed(requested: Roots) -> Array:
-    """How far from each pole asked is still right."""
+    """Tolerance about each requested pole."""
     scale = float(np.abs(requested).max(initial=0.0)) or 1.0
     together = np.sum(np.abs(requested[:, None] - requested[None, :]) <= 1e-3 * scale, axis=1)
     return scale * MISSED ** (1.0 / together)

@@ -1,4 +1,4 @@
-"""Which poles were asked for, and can this model have them?"""
+"""Requested poles, and whether this model can have them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def read_poles(text: str) -> Roots:
 
 
 def conjugate_poles(poles: ArrayLike, states: int) -> Roots:
-    """The poles asked, in order, each pair made exactly conjugate.
+    """The requested poles, in order, each pair made exactly conjugate.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def poles_of(A: Array) -> Roots:
 
 
 def matched(requested: Roots, attained: Roots) -> Roots:
-    """The roots found, each beside the one asked that it is closest to, the closest pairs first."""
+    """The attained roots, each beside the requested one that it is closest to, the closest pairs first."""
     distance = np.abs(requested[:, None] - attained[None, :])
     out = np.zeros_like(requested)
     for _ in range(requested.size):

@@ -25,6 +25,7 @@ from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
+from upright.identification.inference.ties import ties, with_ties
 from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
@@ -75,14 +76,14 @@ def identify(
     Parameters
     ----------
     rig : GreyBox
-        Plant, what is known and what is asked.
+        Plant, what is known and what is to be estimated.
     runs : sequence of Run
         Those with role ``"fit"`` are explained together; those with role ``"predict"`` are only scored, with the
         parameters fixed.
     method : {"auto", "least-squares", "simplex"}
         See `METHODS`.
     progress : callable, optional
-        Told the stage, its cost and its number of simulations, and the share done.
+        Called with the stage, its cost and number of simulations, and the share completed.
     watch : bool
         Whether stretches that something else than the input moved are named, and left out in a second fit.
     near : Fit, optional
@@ -97,7 +98,7 @@ def identify(
     Raises
     ------
     BadInput
-        When no run may be fitted, nothing is asked, or a name does not exist.
+        When no run may be fitted, nothing is to be estimated, or a name does not exist.
     """
     return _identify(rig, runs, method, progress, watch=watch, near=near)
 
@@ -106,7 +107,7 @@ def _identify(
     rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
     conventions: Callable[[], Sequence[str]] | None = None,
 ) -> Fit:  # fmt: skip
-    """As `identify`; a fit without outliers is told what the `conventions` of all samples look like."""
+    """As `identify`; a fit without outliers knows the `conventions` of all samples."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
     fitted = [with_trip_guesses(rig, run) for run in runs if run.role == "fit"]
@@ -247,7 +248,7 @@ def _conclude(
     per_run, groups = run_estimates(best)
     for name, value in log.rivals.items():
         e = widened(estimates[name], (value, value))
-        estimates[name] = replace(e, status="weak" if e.status == "firm" else e.status)
+        estimates[name] = replace(e, status="poorly determined" if e.status == "well determined" else e.status)
     left_out = [n for n in requested.estimated if n not in problem.rig.estimated]
     for name in left_out:
         unit = requested.parameters[name].unit
@@ -276,7 +277,8 @@ def _conclude(
     unseen = () if best.lost else identifiable.sentences({n: p.unit for n, p in requested.parameters.items()})
     conventions = tuple(log.conventions()) if least_explained(scores) < GOOD else ()
     assumed = assumptions(best, estimates, evaluate=not brief)
-    estimates = with_assumptions(estimates, assumed)
+    tied = () if brief else ties(best, estimates)
+    estimates = with_assumptions(with_ties(estimates, tied), assumed)
     late = None if brief or little or conventions else lateness(best)
     warnings += [late.sentence] if late else []
     answers = judge(
@@ -296,6 +298,7 @@ def _conclude(
             judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
+            ties=tied,
             driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
         )
     )

@@ -32,7 +32,7 @@ MOST = 20_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Loaded:
-    """One free swing with a known inertia added [kg or kg m^2]; `command` is what the drive was told meanwhile."""
+    """One free swing with a known inertia added [kg or kg m^2]; `command` is the drive's meanwhile."""
 
     label: str
     added: float
@@ -78,7 +78,7 @@ def swings(
     command : str
         Column of the command: piecewise constant.
     resolution : float, optional
-        Smallest step of the sensor, told from the column when omitted.
+        Smallest step of the sensor, from the column when omitted.
 
     Raises
     ------

@@ -34,7 +34,7 @@ _ALLOWED = (
 
 
 def as_values(law: Law | Rule) -> dict[str, Any]:
-    """Plain values of a law, for JSON: what is as it would be without being said is left out."""
+    """Plain values of a law, for JSON: default values are omitted."""
     out: dict[str, Any] = {"kind": "linear" if isinstance(law, Law) else "rule"}
     for field in fields(law):
         value = getattr(law, field.name)
@@ -78,7 +78,7 @@ def _same(value: Any, default: Any) -> bool:
 
 
 def _function(text: str) -> Function:
-    """Function of a rule's text, which it can be asked for again."""
+    """Function of a rule's text, which `text_of` gives back."""
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:

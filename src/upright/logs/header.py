@@ -1,4 +1,4 @@
-"""What is said of a run before its first row: rig, law, the columns with their units, and which program wrote it."""
+"""Description of a run before its first row: rig, law, the columns with their units, and which program wrote it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class LogColumn(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class LogHeader:
-    """What is said of a run before its first row.
+    """Description of a run before its first row.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class LogHeader:
     driven : tuple of int
         Modes in which the law of the header gives the command; all when empty.
     start : float
-        Time t = 0 since 1970 [s], for other programs to show; 0 where it is not said.
+        Time t = 0 since 1970 [s], for other programs to show; 0 where unknown.
     versions : mapping of str to str
         Program and version that wrote the log; see `versions`.
     """

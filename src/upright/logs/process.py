@@ -1,6 +1,6 @@
 """The process beside the loop: takes rows out of the ring, writes them, and puts them on the disk about once a second.
 
-It ends when it is told to, or when the loop's process is gone; what waits in the ring is written first.
+It ends on request, or when the loop's process is gone; what waits in the ring is written first.
 A disk that is full, or fails, ends the file at its last whole chunk: rows are taken out of the ring as before, so that
 the loop goes on, and the sentence that says so waits in the ring for whoever asks.
 """
@@ -65,7 +65,7 @@ class _Output:
 
 
 class _Disk(threading.Thread):
-    """Puts a file on the disk when asked; the disk may take its time without holding up the chunks."""
+    """Puts a file on the disk on request; the disk may take its time without holding up the chunks."""
 
     def __init__(self, output: _Output) -> None:
         super().__init__(daemon=True)

@@ -73,7 +73,7 @@ class Ring:
         return ""
 
     def take(self, most: int) -> Iterator[tuple[Any, ...]]:
-        """Rows that wait, their numbers first; each is given up when the next is asked for."""
+        """Rows that wait, their numbers first; each is released when the next is read."""
         for position in range(self.marks[TAIL], min(self.marks[HEAD], self.marks[TAIL] + most)):
             at = _ROWS + position % self.rows * self._stride
             end = at + self._row.size
@@ -114,7 +114,7 @@ class Ring:
         struct.pack_into("<II", self._memory, _MESSAGE, len(content), zlib.crc32(content))
 
     def message(self) -> str:
-        """What was said; empty when nothing was."""
+        """Message of the writer; empty when there is none."""
         length, check = struct.unpack_from("<II", self._memory, _MESSAGE)
         content = self._memory[_MESSAGE + 8 : _MESSAGE + 8 + min(length, _ROWS)]
         return content.decode(errors="ignore") if zlib.crc32(content) == check else ""

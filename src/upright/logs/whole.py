@@ -71,7 +71,7 @@ class RunLog:
     def record(self, provenance: Provenance | None = None, *, counts: bool = False) -> Record:
         """The rows as a record: the applied command is its input, the measured coordinates its outputs.
 
-        Left out, unless `counts` are asked for, are the encoders' counts, of which the coordinates are multiples.
+        Left out, unless `counts` are requested, are the encoders' counts, of which the coordinates are multiples.
 
         Raises
         ------

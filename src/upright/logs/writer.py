@@ -85,7 +85,7 @@ class LogWriter:
             raise BadInput(f"the log '{path}' cannot be written: {message}; name another file.")
 
     def _begin(self, header: LogHeader, name: str, inherited: tuple[int, ...], rows: int) -> subprocess.Popen[bytes]:
-        """The process, told the header by its input, whose end tells it later that the loop is gone."""
+        """The process, which reads the header from its input, whose end later means that the loop is gone."""
         try:
             process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "upright.logs.process", str(self._path), name, str(rows)],

@@ -1,6 +1,6 @@
 """What a plant states: its parameters, coordinates, inputs, joints, equilibria and energies.
 
-What its author can have forgotten is said in a sentence when the class is made.
+What its author may have forgotten is reported when the class is made.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def chapter(
     title, source : str
         Heading of the page, and name of the file.
     answers : int, optional
-        On how many answers printed numbers are said to rest.
+        On how many answers printed numbers rest.
     scale : (int, int)
         Ends of the scale of ratings.
     steps : sequence of Step
@@ -152,7 +152,7 @@ def _people(n: int) -> str:
 
 
 def _table(caption: str, headings: Sequence[str], rows: Sequence[tuple[str, ...]]) -> Table:
-    """Numbers beside the name of what was asked."""
+    """Numbers beside the name of the question."""
     return Table(
         caption=caption, headings=tuple(headings), rows=tuple(rows), numbers=tuple(range(1, len(headings)))
     )  # fmt: skip

@@ -138,7 +138,7 @@ def _rating(cell: str, scale: tuple[int, int], where: str) -> float:
 
 
 def _pairs(header: Sequence[str], words: Sequence[set[str]]) -> dict[str, tuple[int, int]]:
-    """Columns before and after by name of what was asked."""
+    """Columns before and after by name of the question."""
     pairs: dict[str, dict[str, int]] = {}
     for i, (heading, w) in enumerate(zip(header, words, strict=True)):
         if not w & (_BEFORE | _AFTER):

@@ -223,7 +223,7 @@ class Bound:
     exact : bool
         Whether both means can come from that many answers; if not, the nearest totals were taken.
     verdict : {"significant", "open", "not significant"}
-        Whatever the answers were, or not to be told from the means.
+        Whatever the answers were, or not decided by the means.
     """
 
     answers: int

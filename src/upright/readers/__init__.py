@@ -1,4 +1,4 @@
-"""Record of a log, whichever program wrote it, and what can be told about its columns.
+"""Record of a log, whichever program wrote it, and what its columns are.
 
 `read` recognises the format from the content, not from the suffix.
 """
@@ -51,7 +51,7 @@ def recognise(source: Source) -> str:
 
 
 def _recognises(name: str, reader: Reader, source: Source) -> bool:
-    """Whether a reader does; one of another package that stops does not, and the others are asked."""
+    """Whether a reader does; one of another package that stops does not, and the others are tried."""
     try:
         return reader.recognises(source)
     except Exception as error:
@@ -64,5 +64,5 @@ def _recognises(name: str, reader: Reader, source: Source) -> bool:
 
 
 def inspect(what: Record | PathLike) -> Inspection:
-    """What can be told about each column and about the time base of a record or a log."""
+    """Inspection of each column and of the time base of a record or a log."""
     return inspect_record(what if isinstance(what, Record) else read(what))

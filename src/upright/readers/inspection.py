@@ -1,4 +1,4 @@
-"""Time base and columns of a log, as far as they can be told before any model: are its times true, what is each?
+"""Time base and columns of a log, before any model: are its times true, what is each?
 
 Some columns are not what their name says. Each test of that answers a sentence, or nothing. They come from logs of
 real rigs: a "Control Effort" that holds the reference, a "Commanded Pos" that follows the encoder, a "velocity" that

@@ -25,7 +25,7 @@ class Reader(Declaration):
     read : callable
         Record of content; what is wrong with it is raised as `Source.bad` says it.
     order : int
-        When it is asked whether it recognises a content, the smallest first. Formats that begin with a mark of their
+        Order in which readers are tried on a content, the smallest first. Formats that begin with a mark of their
         own stand below 30, texts that are recognised by their words above, a table of anything at 100.
     """
 

@@ -1,7 +1,8 @@
 """How late is this machine? The loop's own deadlines with the loop's own work, and nothing at its other end.
 
-What was held is what was tried. Slower rates are judged by the same delays; of faster ones it is only said whether
-delays and work leave time for them: more of a period goes into them, and less of it hides how late a sleep ends.
+Only rates that were tried are confirmed. Slower rates are judged by the same delays; of faster ones it is only said
+whether delays and work leave time for them: more of a period goes into them, and less of it hides how late a sleep
+ends.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Jitter:
     behind : array, shape (N,)
         How far behind its deadline each tick was woken [s].
     overslept : array, shape (N,)
-        How much later than asked the sleep before it ended [s]; see `realtime.pace`.
+        How much later than requested the sleep before it ended [s]; see `realtime.pace`.
     late : int
         Ticks that were late: see `realtime.pace`.
     work : array, shape (N,)
@@ -155,7 +156,7 @@ def measure(
 
 
 def _stolen() -> float:
-    """Time that a host gave to others since the start [s]; none is told where there is no host, or no Linux."""
+    """Time that a host gave to others since the start [s]; unknown where there is no host, or no Linux."""
     try:
         with open("/proc/stat", encoding="ascii") as file:
             return int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")

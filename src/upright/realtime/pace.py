@@ -88,7 +88,7 @@ class WallClock:
     late : int
         Ticks that were late so far.
     overslept : float
-        How much later than asked the last sleep ended, most of which a vigil hides [s]; 0 where there was no sleep.
+        How much later than requested the last sleep ended, most of which a vigil hides [s]; 0 where there was no sleep.
     """
 
     def __init__(

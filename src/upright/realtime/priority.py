@@ -1,7 +1,7 @@
 """What a process may do to be on time here: memory that stays, no collector, a place before others.
 
 Linux gives FIFO priority to whoever may have it (root, CAP_SYS_NICE, an rtprio limit). Else, from 6.12 on, a short
-slice makes the ordinary scheduler wake the process early; else nothing helps but an idle machine, and that is said.
+slice makes the ordinary scheduler wake the process early; else only an idle machine helps, and a warning says so.
 
 A processor that sleeps between ticks wakes late, and a virtual one is given to others by its host meanwhile: whoever
 may have FIFO also asks for processors that stay awake (measured in `benchmarks.jitter`).
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 FIFO_PRIORITY = 50
 SLICE = 100_000
-"""Slice asked of the ordinary scheduler [ns]; the shortest it takes."""
+"""Slice requested of the ordinary scheduler [ns]; the shortest it takes."""
 _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274}
 _WAKE_LATENCY = "/dev/cpu_dma_latency"
 """Holds processors to a time [us] in which they wake, for as long as the file is open."""

@@ -139,7 +139,7 @@ def _ask(stop: Any, watch: Callable[[RunState], str], window: _Window) -> None:
 
 @contextmanager
 def _no_interrupt_for_the_child() -> Generator[None]:
-    """Ctrl-C reaches a whole group of processes; the child is to be asked by its flag, and starts deaf to it."""
+    """Ctrl-C reaches a whole group of processes; the child is stopped by its flag, and ignores the signal."""
     import signal
     import threading
 

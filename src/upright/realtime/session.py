@@ -102,7 +102,7 @@ class RunEnd:
         Why it ended early, as a sentence; empty when it ran to its end.
     faults : Fault
     about : Capabilities or None
-        What the rig said of itself; None when it did not answer.
+        Capabilities that the rig reports; None when it did not answer.
     held : Limits or None
         As read back.
     target : tuple of float
@@ -161,9 +161,9 @@ def carry_out(
     order : RunOrder
     law : Law or Rule
     show : callable
-        Told how it goes, at every tick; has to be quick.
+        Called with the state at every tick; has to be quick.
     stopped : callable
-        Asked at every tick whether somebody wants it to end: a sentence, or an empty one.
+        Called at every tick: why to end: a sentence, or an empty one.
     pace : callable
         Gives the clock of the loop for a rig, and a warning about it; called when all is ready.
     """
@@ -191,6 +191,8 @@ def carry_out(
             hear.log.event(*event)
         ticking, warning = pace(about)
         end["warning"] = warning
+        if about.paced and not about.virtual:
+            beside.clock = clock.monotonic
         beside.start(order.mode)
         stage.let_go()
         _loop(order, beside, ticking, hear.log, show, end)

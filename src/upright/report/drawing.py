@@ -236,7 +236,7 @@ def roots(
 
 @dataclass(frozen=True, kw_only=True)
 class Poles:
-    """Poles [1/s] of one kind with their mark: ``x`` open loop, ``o`` asked, ``+`` attained."""
+    """Poles [1/s] of one kind with their mark: ``x`` open loop, ``o`` requested, ``+`` attained."""
 
     name: str
     values: Roots

@@ -1,4 +1,4 @@
-"""What a page says: chapters of parts, with sentences, tables and pictures; how it looks is said elsewhere.
+"""What a page says: chapters of parts, with sentences, tables and pictures; how it looks is decided elsewhere.
 
 The same chapter becomes HTML (`report.html`), a PDF (`report.pdf`), lines on a terminal (`report.terminal`) and plain
 values, which JSON can hold, to be read again. Many chapters make a book.
@@ -74,9 +74,9 @@ class Table:
     numbers : tuple of int
         Columns set flush right.
     badge : int, optional
-        Column of single words that say how something turned out, such as ``firm``, ``weak`` or ``kept``.
+        Column of single words that say how something turned out, such as ``kept`` or ``well determined``.
     folded : str
-        Line under which a screen hides the table until it is asked for; not hidden when empty.
+        Line under which a screen hides the table until it is opened; not hidden when empty.
     anchors : tuple of str
         Where on the page the first cell of each row leads; nowhere when empty.
     """
@@ -92,7 +92,7 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Picture:
-    """A drawing, the caption under it, and what a reader who cannot see it is told.
+    """A drawing, the caption under it, and a description for readers who cannot see it.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chapter:
-    """One log, fit, design or experiment, told.
+    """Report of one log, fit, design or experiment.
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ class Chapter:
     numbers : mapping
         The same as plain values for another program: SI.
     key, about : str
-        In a report of several: as the chapter is asked for, and what it is about.
+        In a report of several: the chapter's name, and what it is about.
     finished : bool
         False where the work was stopped or failed.
     first_line : str

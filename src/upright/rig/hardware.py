@@ -1,7 +1,7 @@
 """Drive, encoders, servo and travel of a rig, each number with its source.
 
 A study says it once, `fit.json` carries it, and every verb that simulates or designs takes it from there. A number that
-nobody gave is asked for, or taken from a vendor's data sheet that somebody chose by name; it is never filled in.
+is missing is requested, or taken from a vendor's data sheet chosen by name; it is never filled in.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ class Rig(Shown):
     draws : tuple of (Plant, float)
         Plants and gains drawn from a fit's covariance; empty without one.
     scales : tuple of float
-        What the encoders show over what is true; empty where the counts per unit are as said.
+        What the encoders show over what is true; empty where the counts per unit are right.
     mounting : Mounting, optional
         What else the encoders show: play and shafts off centre. Logs have both; a loop, which stays about one point,
         has the error and the slope that a shaft off centre has there.
@@ -143,7 +143,7 @@ class Rig(Shown):
         }  # fmt: skip
         entries: dict[str, Entry] = {}
         gone: set[str] = set()
-        for name in _ENTRIES.keys() & changes.keys():
+        for name in [n for n in _ENTRIES if n in changes]:
             value = in_unit(changes.pop(name), units[name])
             if name in ("limit", "period") and not 0 < value < math.inf:
                 raise BadInput(f"the {name} of a rig must be positive and finite, got {value:g}.")

@@ -2,7 +2,7 @@
 
 What a board can do by itself (read encoders, put a command out, switch its power stage) is a `Port`; everything that
 makes a `LiveRig` of it stands here once. At every tick the command is put out, a period passes, the encoders are read,
-and every limit is looked at before anybody is told; a limit that is passed puts the command to zero first.
+and every limit is checked before anything is reported; a limit that is passed puts the command to zero first.
 """
 
 from __future__ import annotations

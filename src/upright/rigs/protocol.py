@@ -1,6 +1,6 @@
 """What every rig answers to: a twin, a replay of a record, firmware at the end of a wire, a vendor's board.
 
-A rig moves between five modes, and nothing but a fault leaves `Mode.HOST` or `Mode.MCU` without being asked::
+A rig moves between five modes, and nothing but a fault leaves `Mode.HOST` or `Mode.MCU` without a request::
 
     IDLE -> ARMED -> HOST | MCU -> IDLE        any of them -> FAULT -> (clear_fault) -> IDLE
 

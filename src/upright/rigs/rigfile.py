@@ -112,7 +112,7 @@ class RigFile:
         Raises
         ------
         BadInput
-            When limits of hardware leave out what must be said.
+            When limits of hardware leave out what is required.
         """
         section = _root(self.path).section("limits")
         if not section.values:

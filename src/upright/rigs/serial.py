@@ -143,7 +143,7 @@ class SerialRig:
         return self._about
 
     def _greet(self, every: int) -> wire.Hello:
-        """What the firmware says of itself when it is told how many ticks there are between two exchanges."""
+        """Capabilities of the firmware, at this many ticks between two exchanges."""
         greeting = wire.greeting(every, nonce := self._nonce())
         hello = self._hello = wire.hello(self._ask(Kind.HELLO, greeting, max(_BOOT, self._patience)))
         if hello.protocol == wire.PROTOCOL and hello.nonce != nonce:
@@ -326,7 +326,7 @@ class SerialRig:
         raise self._refusal(_WHY[self._status.result])
 
     def _on_wire(self, limits: Limits) -> wire.LimitsOnWire:
-        """Limits in the firmware's units, never wider than asked for."""
+        """Limits in the firmware's units, never wider than requested."""
         c, hello = self._there(), self._hello
         assert hello is not None
         n = len(c.coordinates)

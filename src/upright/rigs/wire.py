@@ -223,7 +223,7 @@ class LimitsOnWire:
 class Snapshot(NamedTuple):
     """How it was when the first fault since the last clearing came.
 
-    `moved` are counts in the last speed window, `asked` is the command before its limit [steps]; `lost` counts ticks
+    `moved` are counts in the last speed window, `command` is the command before its limit [steps]; `lost` counts ticks
     that never came and `dropped` frames that the firmware threw away, since its reset.
     """
 

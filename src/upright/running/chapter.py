@@ -1,4 +1,4 @@
-"""Runs, check-ups and jitter, told: what came of it, how far to trust it, and what to do next."""
+"""Reports of runs, check-ups and jitter: the result, how far to trust it, and what to do next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Is this rig wired as it is described? Asked before any loop: link, limits, encoders by hand, a small pulse."""
+"""Is this rig wired as it is described? Checked before any loop: link, limits, encoders by hand, a small pulse."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def check_up(
     ----------
     path : Path
     hand : callable, optional
-        Asked, with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
+        Called with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
         A twin's own hand does it when omitted.
     clear : bool
         Whether latched faults are forgotten first.

@@ -36,7 +36,7 @@ MODES = {"host": Mode.HOST, "mcu": Mode.MCU}
 
 @dataclass(frozen=True, kw_only=True)
 class RunRequest:
-    """What is asked of a run.
+    """Request for a run.
 
     `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
     `from_rest` begins where the rig rests, however far that is from what is held, as a swing-up does.
@@ -79,7 +79,7 @@ class RigRun:
 
     Attributes
     ----------
-    wish : RunRequest
+    request : RunRequest
     file : RigFile
     model : Rig
         As it is known.
@@ -215,7 +215,7 @@ class RigRun:
 def run_rig(
     request: RunRequest, folder: Path, *, watch: Callable[[RunState], str] = lambda _: ""
 ) -> RigRun:  # fmt: skip
-    """Run what is asked, log it, and say what it came to.
+    """Run what is requested, log it, and report the result.
 
     Parameters
     ----------

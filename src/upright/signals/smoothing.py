@@ -62,7 +62,7 @@ def dominant_period(y: Array, dt: float) -> float:
 def savitzky_golay(y: Array, dt: float, width: int, *, order: int = 4, derivatives: int = 2) -> Motion:
     """Least-squares polynomials over a sliding window of `width` samples (made odd), fitted one-sided at the ends.
 
-    The acceleration is zero when only one of the `derivatives` is asked for.
+    The acceleration is zero when only one of the `derivatives` is requested.
     """
     from scipy.ndimage import correlate1d
 

@@ -38,10 +38,10 @@ RESTS = 0.5
 """Seconds for which a body rests against a command that moved it before, when its drive is dead."""
 
 LEAST = 30
-"""Independent stretches (record over smoothing) that a record needs before anything is said about it."""
+"""Independent stretches (record over smoothing) that a record needs before it is judged."""
 
 STUCK = 0.02
-"""Share of the largest speed below which a body may stick, where nothing can be said about its drive."""
+"""Share of the largest speed below which a body may stick, where its drive cannot be judged."""
 
 ROWS = 800
 """Samples that enter the regression."""

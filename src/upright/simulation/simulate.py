@@ -135,7 +135,7 @@ def ensemble(
 
     Parameters are those of `simulate`; `settle` [s] is when errors begin to count, and `threads` defaults to the
     number of processors this process may use. With `workers` blocks of lanes are shared among those instead, one
-    thread each, and `progress` is told; the numbers are the same. On the `device` ``"gpu"`` each lane is a thread of
+    thread each, and `progress` is called; the numbers are the same. On the `device` ``"gpu"`` each lane is a thread of
     its own there, and they are the same to rounding.
     """
     if device == "gpu" and workers is not None:

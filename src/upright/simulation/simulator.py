@@ -244,7 +244,7 @@ class Simulator:
         Raises
         ------
         BadInput
-            When shapes do not fit together, or there is no GPU where one was asked for.
+            When shapes do not fit together, or there is no GPU where one was requested.
         """
         if device not in ("cpu", "gpu"):
             raise BadInput(f"motions are computed on device 'cpu' or 'gpu', got {device!r}.")

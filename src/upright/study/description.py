@@ -66,7 +66,7 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
 
 
 def _encoder(section: Section, sensor: Sensor) -> dict[str, Entry]:
-    """Counts, sign and offset of one encoder, as far as they are said."""
+    """Counts, sign and offset of one encoder, as far as specified."""
     c, out = sensor.coordinate, dict[str, Entry]()
     step = sensor.resolution or sensor.per_count
     if step:

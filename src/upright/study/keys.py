@@ -142,8 +142,16 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             ),
             Key("measured", "true", "a known number that somebody measured on this rig, as one with an uncertainty is"),
             Key("guess", '"1.6e-3 kg m^2"', "a number to estimate, and where to start"),
-            Key("min", "0", "lower bound of the estimate; the plant's own if left out"),
-            Key("max", '"5e-3 kg m^2"', "upper bound of the estimate"),
+            Key(
+                "min",
+                "0",
+                "lower bound of the estimate, else the plant's own; least that an assumed number may be, else a tenth",
+            ),
+            Key(
+                "max",
+                '"5e-3 kg m^2"',
+                "upper bound of the estimate; most that an assumed number may be, else ten times it",
+            ),
         ),
     ),
     "actuator": (

@@ -117,7 +117,7 @@ def load_study(
     text : str, optional
         The study itself, when it is in no file; `path` then only names it.
     records : mapping of file name to Record, optional
-        Logs that are at hand already.
+        Logs that are read already.
     plant : type of Plant, optional
         In the place of the one that the study names.
 

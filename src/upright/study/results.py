@@ -34,11 +34,12 @@ def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | Non
 
 def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) -> dict[str, Any]:
     """What `fit.json` holds, as plain values; `crossed` adds what each run's prediction by the others scored."""
+    ranges = {a.name: a.range for a in fit.assumptions}
     known = {
         name: Estimate(
             value=p.value,
             stderr=p.uncertainty,
-            interval=(p.value - 1.96 * p.uncertainty, p.value + 1.96 * p.uncertainty),
+            interval=ranges.get(name, (p.value - 1.96 * p.uncertainty, p.value + 1.96 * p.uncertainty)),
             unit=p.unit,
             status="assumed" if p.assumed else "known",
         )
@@ -64,7 +65,8 @@ def fit_content(fit: Fit, study: Study, crossed: CrossValidation | None = None) 
                 "size": a.size,
                 "percent_per_percent": {n: round(e, 6) for n, e in a.follows.items()},
                 "rests": resting(a),
-                "without_it": a.without,
+                "range": a.range,
+                "ratios": a.ratios,
             }
             for a in fit.assumptions
         ],

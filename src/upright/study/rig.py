@@ -1,4 +1,4 @@
-"""What is known about the rig, and what is asked? [rig], [parameters] and [actuator] of a study."""
+"""Known and estimated numbers of the rig: [rig], [parameters] and [actuator] of a study."""
 
 from __future__ import annotations
 
@@ -126,7 +126,8 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
             f' for instance {key} = {{ guess = "1 {what.unit}", min = 0 }}',
         )
     estimate = "guess" in table
-    for wrong in ("min", "max") if not estimate else ("uncertainty", *SOURCES):
+    ranged = not estimate and bool(table.values.get("assumed"))
+    for wrong in ("uncertainty", *SOURCES) if estimate else () if ranged else ("min", "max"):
         if wrong in table:
             raise table.error(
                 wrong,
@@ -142,13 +143,16 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
             raise table.error("assumed", f"{name} is assumed or measured, not both; leave one out")
         if assumed and sigma > 0:
             raise table.error("assumed", f"{name} has an uncertainty, so it is known about, not assumed; leave one out")
+        lower, upper = _bounds(section, key, table, what, (-math.inf, math.inf))
+        if not lower <= number <= upper:
+            raise table.error(
+                "value", f"{name} is assumed to be {number:g} {what.unit}, outside {lower:g} to {upper:g}"
+            )
         return Parameter(
-            name=name, value=number, unit=what.unit, meaning=what.meaning, uncertainty=sigma, assumed=assumed
-        )
-    lower, upper = (
-        _number(section, (key, bound), table.values[bound], what) if bound in table else default
-        for bound, default in (("min", what.lower), ("max", what.upper))
-    )
+            name=name, value=number, unit=what.unit, meaning=what.meaning, uncertainty=sigma, assumed=assumed,
+            lower=lower, upper=upper,
+        )  # fmt: skip
+    lower, upper = _bounds(section, key, table, what, (what.lower, what.upper))
     if not lower <= number <= upper or lower == upper:
         raise table.error(main, f"{name} starts at {number:g} {what.unit}, outside its bounds {lower:g} to {upper:g}")
     return Parameter(
@@ -160,6 +164,17 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
         lower=max(lower, what.lower),
         upper=min(upper, what.upper),
     )
+
+
+def _bounds(
+    section: Section, key: str, table: Section, what: Quantity, otherwise: tuple[float, float]
+) -> tuple[float, float]:
+    """Bounds of a guess, or the range of an assumed number."""
+    lower, upper = (
+        _number(section, (key, bound), table.values[bound], what) if bound in table else default
+        for bound, default in zip(("min", "max"), otherwise, strict=True)
+    )
+    return lower, upper
 
 
 def _number(section: Section, keys: tuple[str, ...], value: Any, what: Quantity) -> float:

@@ -21,7 +21,7 @@ from upright.files import read_text
 
 _LEAST = 1e-60
 SOURCES = ("assumed", "measured")
-"""What a known number may be said to be, as in ``{ value = "10 V", measured = true }``."""
+"""Source of a known number, as in ``{ value = "10 V", measured = true }``."""
 KeyPath = tuple[str | int, ...]
 """Keys from the root down; the entries of a list of tables are counted from 0."""
 

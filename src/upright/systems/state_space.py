@@ -210,7 +210,7 @@ class StateSpace(Shown):
         ------
         BadInput
             When the period is not positive, the delay negative or beyond 1000 samples, the lag negative, or a sampled
-            model is asked for what happens between its samples.
+            model is evaluated between its samples.
         """
         if not (math.isfinite(period) and period > 0):
             raise BadInput(f"a sampled model needs a period above 0 s, got {period:g}; give it in seconds.")

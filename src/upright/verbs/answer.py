@@ -1,4 +1,4 @@
-"""What a verb answers: a value, told as a chapter, with the files that were written."""
+"""Result of a verb: a value, its report as a chapter, with the files that were written."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Answer(Generic[V]):
     Attributes
     ----------
     value
-        What was found; its attributes can be asked for here as well.
+        The result; its attributes can be read here as well.
     chapter : Chapter
-        The same, told.
+        Its report.
     files : tuple of Path
         What was written.
     """

@@ -44,7 +44,7 @@ class Command:
     flags : mapping of str to Flag
     given : callable
         Turns what was typed, by parameter, into what the verb is called with.
-    told : callable, optional
+    lines : callable, optional
         What is printed piece by piece, texts or answers, where the verb returns no answer.
     wrong : callable
         Whether an answer, with the flags, ends the command with exit code 3; interrupted ones end with 130.
@@ -82,7 +82,7 @@ class Command:
 
 
 def command(group: str = Command.group, **settings: Any) -> Callable[[V], V]:
-    """Decorator that offers a verb as a command; see `Command` for what can be said."""
+    """Decorator that offers a verb as a command; see `Command` for its settings."""
 
     def declare(verb: V) -> V:
         verb.command = Command(verb=verb, group=group, **settings)  # type: ignore[attr-defined]

@@ -94,10 +94,10 @@ def lab(
     experiment : str or sequence of str, optional
         Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
     rig : str, optional
-        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of a rig at hand
+        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
     seed : int
-        Which rig of the make; 0 is the one as designed. Of a rig at hand, that of the rigs drawn from its fit.
+        Random seed of the rig model; 0 is nominal. On hardware, that of the rigs drawn from its fit.
     out : path, optional
         Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
@@ -111,7 +111,7 @@ def lab(
         Why laws from a fit that is not trusted drive hardware all the same; the logs keep it. Without it such laws are
         not armed.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     ask : callable, optional
         Asks the person beside a rig for something, in a sentence; answers whether it was done. Hardware needs it.
     watching : callable, optional
@@ -191,7 +191,7 @@ def _live(
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, nonideal: bool, alone: bool,
     accept: str,
 ) -> LiveStand:  # fmt: skip
-    """The rig of a RIG.toml; what cannot be had of it is said first."""
+    """The rig of a RIG.toml; what it cannot do is reported first."""
     from upright.experiments.stand.live import live_stand, nobody, nobody_watches
     from upright.experiments.stand.templates import write_templates
     from upright.report.symbols import typed
@@ -316,7 +316,7 @@ def survey(
     Raises
     ------
     BadInput
-        When the sheet cannot be read, or it is not told on how many answers it rests.
+        When the sheet cannot be read, or the number of answers is not specified.
     """
     from upright.questionnaire.chapter import chapter
     from upright.questionnaire.sheet import Ratings, read_sheet, read_table

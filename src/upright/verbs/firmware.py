@@ -20,7 +20,6 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 @command(
     name="firmware build",
     metavars=_METAVARS,
-    defaults={"out": "firmware"},
     more="""
     upright firmware build --drive pair
     upright firmware build --drive pair --rig RIG.toml     ceilings that no host can widen: the rig's own limits
@@ -29,7 +28,7 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 @keeps_its_inputs
 def firmware_build(
     *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] = "firmware",
+    out: str | os.PathLike[str] = "upright-firmware",
 ) -> Answer[Image]:  # fmt: skip
     """Make the image that goes onto a board.
 
@@ -86,7 +85,7 @@ def firmware_build(
 )
 def firmware_flash(
     *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None, port: str = "",
-    out: str | os.PathLike[str] = "firmware", hand: Callable[[str], bool] = lambda _: True,
+    out: str | os.PathLike[str] = "upright-firmware", hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
     """Build the image and write it onto the board: port found, you asked, read back, greeted.
 

@@ -59,7 +59,7 @@ def read(file: Log, *, reader: str = "", time_unit: str = "") -> Record:
 def show(
     log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False, time_unit: str = ""
 ) -> Answer[Inspection]:
-    """What a log holds: columns, sample rate, quanta, gaps, lying columns.
+    """What a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def show(
     out : path, optional
         Folder for the picture show-LOG.svg, or the picture's own name (SVG, PNG).
     plot : bool
-        Draw the columns also where no `out` is named: into the folder at hand.
+        Draw the columns also where no `out` is named: into the current folder.
     time_unit : str, optional
         Unit of a file's time column that states none, such as "ms".
 
@@ -107,7 +107,7 @@ def show(
 def show_logs(
     logs: Sequence[str | os.PathLike[str]], *, out: str | os.PathLike[str] = "", plot: bool = True, time_unit: str = ""
 ) -> Iterator[Answer[Inspection]]:
-    """Print and draw what a log holds: columns, sample rate, quanta, gaps, lying columns.
+    """Print and draw what a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
     Readable are ECP exports, tab-separated and comma-separated text with or without names, MATLAB version 5, CSV
     exports of ROS bags and upright's own logs of runs (MCAP); the format is recognised from the content.

@@ -43,7 +43,7 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     out : path, optional
         Folder for the picture show-LOG.svg.
     plot : bool
-        Draw the columns also where no `out` is named: into the folder at hand.
+        Draw the columns also where no `out` is named: into the current folder.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
 def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvaged]:
     """Write the rows of a torn log, up to its first error, to a whole file.
 
-    Every row that is kept was checked; how many were kept and lost is said. The log itself stays as it is.
+    Every row that is kept was checked; the counts of kept and lost rows are reported. The log itself stays as it is.
 
     Parameters
     ----------

@@ -180,7 +180,7 @@ def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
 
 
 def _period(law: Any, dt: float | None) -> float:
-    """Time between samples: the one asked for, or the one that gains or a law are for."""
+    """Time between samples: the requested one, or the one that gains or a law are for."""
     own = (law.period if isinstance(law, Gains | Law | Rule) else None) or None
     if dt is not None and own is not None and not math.isclose(dt, own, rel_tol=1e-6):
         raise BadInput(

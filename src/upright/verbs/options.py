@@ -1,4 +1,4 @@
-"""Options that several verbs share, each said and explained once; a verb takes them as ``**on: Unpack[RigOptions]``.
+"""Options that several verbs share, each declared and explained once; verbs take ``**on: Unpack[RigOptions]``.
 
 `cli.build` makes options of the command line of them.
 """
@@ -95,7 +95,7 @@ class DesignOptions(LoopOptions, total=False):
 
 
 def shared_parameters(verb: Parameter, module: str) -> tuple[dict[str, Parameter], dict[str, str]]:
-    """Options that ``**on: Unpack[...]`` of a verb of a module stands for, as parameters, and what is said of each."""
+    """Options that ``**on: Unpack[...]`` of a verb of a module stands for, as parameters, with their texts."""
     named = re.fullmatch(r"(?:\w+\.)?Unpack\[(\w+)\]", str(verb.annotation))
     kind: Any = getattr(sys.modules[module], named[1], None) if named else None
     if not is_typeddict(kind):

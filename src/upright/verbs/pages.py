@@ -58,7 +58,7 @@ def page_folder(out: str | os.PathLike[str] | None, pdf: bool) -> Path:
     Raises
     ------
     BadInput
-        When it is a file, or a PDF is asked for and there is no program to make it.
+        When it is a file, or a PDF is requested and there is no program to make it.
     """
     can_be_pdf(pdf)
     return folder(out or "")
@@ -70,7 +70,7 @@ def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Pa
     Raises
     ------
     BadInput
-        When it is a file, or a PDF is asked for and there is no folder for it or no program to make it.
+        When it is a file, or a PDF is requested and there is no folder for it or no program to make it.
     """
     pdf_has_folder(out, pdf)
     return None if out is None else folder(out)
@@ -83,7 +83,7 @@ def pdf_has_folder(out: str | os.PathLike[str] | None, pdf: bool) -> None:
 
 
 def can_be_pdf(requested: bool) -> bool:
-    """Whether a PDF is asked for.
+    """Whether a PDF is requested.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def can_be_pdf(requested: bool) -> bool:
 
 
 def write_page(chapter: Chapter, path: Path, pdf: bool) -> list[Path]:
-    """Write a chapter as HTML and, where that is asked for, as PDF beside it; gives back the files."""
+    """Write a chapter as HTML and, where requested, as PDF beside it; gives back the files."""
     from upright.report.html import write_html
     from upright.report.pdf import write_pdf
 

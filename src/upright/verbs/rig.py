@@ -75,7 +75,7 @@ def run(
     check : bool
         Compare a small pulse with the model first.
     watch : bool
-        Look for lying encoders beside the loop, by a bank of Kalman filters.
+        Tell wrong encoders and a weak drive from hands and friction beside the loop.
     accept : str, optional
         Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
         not armed.
@@ -202,7 +202,7 @@ def rig_doctor(
     pulse : bool
         Give a small pulse and compare its answer with the model's.
     hand : callable, optional
-        Asked to move a coordinate by hand, with a sentence; answers whether that was done.
+        Called with a sentence, to move a coordinate by hand; answers whether that was done.
 
     Returns
     -------

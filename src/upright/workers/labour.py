@@ -59,7 +59,7 @@ class Pool(ABC):
     width: int
     gone = False
     loss: str
-    """What is said where it is gone."""
+    """Message where it is gone."""
     hopeless: tuple[type[BaseException], ...] = ()
     """What is raised when an item has killed its workers too often."""
 

@@ -120,7 +120,7 @@ def spread(
         Sizeable ones: handing one out takes about a millisecond.
     workers : Workers
     progress : callable, optional
-        Told in one line how many are done.
+        Called in one line with how many are completed.
     what : str
         Name of one item in that line.
 

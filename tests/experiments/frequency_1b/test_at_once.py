@@ -91,7 +91,7 @@ def test_a_twin_with_dry_friction_is_identified_on_either_stand(live, tmp_path):
     stand = made(tmp_path, text) if live else TwinStand(rig=truth, make=MAKES["rectilinear"])
     fit = run_at_once(stand, tmp_path / "1b", silent).fit
     # not the lag, whose interval of 0.1 us is finer than that the twin steps twice a period and the fit once
-    firm = {n: e for n, e in fit.estimates.items() if e.status == "firm"}
+    firm = {n: e for n, e in fit.estimates.items() if e.status == "well determined"}
     for name, true in {**truth.plant.parameters(), "actuator.gain": truth.gain}.items():
         if name in firm:
             assert firm[name].interval[0] <= true <= firm[name].interval[1], name

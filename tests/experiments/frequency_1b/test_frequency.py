@@ -150,9 +150,9 @@ def test_a_sine_moves_the_rig_as_far_as_it_may_or_as_the_drive_can(hurried):
     _, middle, fast = hurried.dwells
     reached = [np.max(np.ptp(d.record.y, axis=0) / 2 / np.array(make.reach)) for d in (middle, fast)]
     assert 0.75 < reached[0] < 1.33
-    assert middle.amplitude < SHARE * make.limit
+    assert middle.amplitude < SHARE * make.rig.limit
     assert reached[1] < 0.75
-    assert fast.amplitude == pytest.approx(SHARE * make.limit, rel=0.02)
+    assert fast.amplitude == pytest.approx(SHARE * make.rig.limit, rel=0.02)
 
 
 @pytest.mark.parametrize("first", [0.2, 5.0])

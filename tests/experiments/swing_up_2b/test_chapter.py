@@ -40,9 +40,13 @@ def lie(**what):
 )  # fmt: skip
 def test_the_verdict_says_how_far_it_came(ascent, caught, verdict):
     done = experiment(ascent)
-    assert (done.caught, done.verdict) == (caught, verdict)
+    # a twentieth of 8 V, of 10 V: its rms over 0.3 or more of a period is below its peak of 4 % of the limit
+    found, _, rest = done.verdict.partition(" The command at rest has an rms of ")
+    assert (done.caught, found) == (caught, verdict)
+    assert bool(rest) == caught
+    assert "quiet" not in rest
     told = chapter(done)
-    assert (told.verdict, told.sound) == (verdict, caught)
+    assert (told.verdict, told.sound) == (done.verdict, caught)
     assert told.numbers["swing_up"]["held"] == caught
 
 
@@ -78,12 +82,16 @@ def test_the_way_up_is_a_table_of_what_the_log_shows():
     """8 V of 10: never at the limit; the catch's ellipsoid is three quarters of what the linear model allows."""
     told = chapter(experiment(climbed(falls=[(2.5, 3.0)], volts=8.0)))
     (table,) = [b for b in told.parts[1].content if hasattr(b, "rows")]
+    a, b = 5 * (8.0 - 5.0 / 3), 5 * 8.0  # the last third of standing, as angles of 0.4 V cos
+    mean = (math.sin(b) - math.sin(a)) / (b - a)
+    rms = 0.04 * math.sqrt(0.5 + (math.sin(2 * b) - math.sin(2 * a)) / (4 * (b - a)) - mean**2)
     assert table.rows == (
         ("upright for good after", "3.00", "s"),
         ("half swings before the first handover", "5", ""),
         ("handovers, falls", "2, 1", ""),
         ("largest command, of its limit", "8 of 10", "V"),
         ("share of the time at the limit", "0.0 %", ""),
+        ("command at rest, rms, of the limit", f"{100 * rms:.1f} %", ""),
         ("farthest from the middle, of the travel", "0.6 of 1.5", "rad"),
         ("ellipsoid of the catch, of what the linear model allows", "75.0 %", ""),
     )
@@ -115,10 +123,11 @@ def test_lies_are_counted_by_who_notices_them_and_when():
 
 def test_the_next_step_follows_from_what_came_of_it():
     own = chapter(experiment(climbed(), source="fit.json"))
-    assert [s.command for s in own.steps] == ['upright swing-up fit.json --seed 3 --lie "theta=2"']
+    export = "upright export FOLDER/swing_up.json --to c"
+    assert [s.command for s in own.steps] == ['upright swing-up fit.json --seed 3 --lie "theta=2"', export]
     sheet = [s.command for s in chapter(experiment(climbed())).steps]
     assert sheet == [
-        'upright swing-up --rig furuta --seed 3 --lie "theta=2"', "upright swing-up FIT.json --seed 3",
+        'upright swing-up --rig furuta --seed 3 --lie "theta=2"', export, "upright swing-up FIT.json --seed 3",
     ]  # fmt: skip
     lost = [s.command for s in chapter(experiment(climbed(caught=99), source="fit.json")).steps]
     assert lost[1] == "upright swing-up fit.json --seed 3 --travel 3"  # twice as far

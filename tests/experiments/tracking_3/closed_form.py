@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.control import Trial
-from upright.control.effort import Effort
+from upright.control.effort import Effort, RestEffort
 from upright.control.score import StepFigures
 from upright.experiments.tracking_3.laws import AT, far_pd, near_pd, paper_sets, with_sum
 from upright.experiments.tracking_3.run import Chosen, Outcome, StepTrial, Tracking
@@ -47,12 +47,15 @@ FIGURES = {
 }  # fmt: skip
 
 
-def ran(*, tripped=math.inf, moved=True, peak=7.89, share=0.789, saturated=0.0, give=GIVE, **figures) -> StepTrial:
+def ran(
+    *, tripped=math.inf, moved=True, peak=7.89, share=0.789, saturated=0.0, give=GIVE, rms=0.02, **figures
+) -> StepTrial:
     """A run with these figures."""
     seen = StepFigures(**(FIGURES | figures)) if moved and math.isinf(tripped) else None
     return StepTrial(
-        trial=motion(), figures=seen, effort=Effort(peak=peak, share=share, saturated=saturated), twist=0.11,
-        travel=0.22, give=give, tripped=tripped,
+        trial=motion(), figures=seen, effort=Effort(peak=peak, share=share, saturated=saturated),
+        rest=RestEffort(rms=rms, peak=2 * rms) if math.isinf(tripped) else None, twist=0.11, travel=0.22, give=give,
+        tripped=tripped,
     )  # fmt: skip
 
 

@@ -230,7 +230,8 @@ def test_numbers_are_those_of_the_runs_in_si_units():
     assert law["found"] == {
         "change": 0.24, "rise": 0.1011, "peak_time": 0.2022, "overshoot": 0.0303, "settling_2": 0.4044,
         "settling_5": 0.3505, "arrival": 0.6067, "error": 0.02 * SIZE, "effort_peak": 7.89, "effort_share": 0.789,
-        "saturated": 0.25, "twist": 0.11, "travel": 0.22, "give": 0.05, "tripped": math.inf,
+        "saturated": 0.25, "rest": {"quiet": True, "rms": 0.02, "peak": 0.04},
+        "twist": 0.11, "travel": 0.22, "give": 0.05, "tripped": math.inf,
     }  # fmt: skip
     assert (law["within_limits"], told["laws"]["set 1"]["within_limits"]) == (False, True)
     assert told["laws"]["far"]["found"]["rise"] is None
@@ -273,3 +274,15 @@ def test_pictures_of_the_reasons_are_of_the_fitted_model():
     for law in (SET_1, SET_4, PD, STIFF):
         assert ends[law.name] == [[law.stiffness, max(law.decay, 0.0)]]
     assert bargain.get_xlabel() == "static force per error [N m/rad]"
+
+
+def test_a_set_that_bangs_at_rest_is_named_and_not_sound():
+    """A tenth of the limit is quiet; three tenths are the largest disturbance of their own rig."""
+    busy = whole(last={"rms": 0.3})
+    told = chapter(busy)
+    assert "At rest the effort is excessive: the command's rms is 30 % of the limit with set 4 (10 % is quiet)." in (
+        told.verdict
+    )
+    assert not told.sound
+    assert chapter(whole(last={"rms": 0.1})).sound
+    assert "excessive" not in chapter(whole(last={"rms": 0.1})).verdict

@@ -81,7 +81,7 @@ def test_the_pole_that_matters_is_the_one_by_which_it_falls() -> None:
 )
 def test_digits_follow_from_the_interval(value: float, width: float, expected: int) -> None:
     number = Estimate(
-        value=value, stderr=0.0, interval=(value - width / 2, value + width / 2), unit="1/s", status="firm"
+        value=value, stderr=0.0, interval=(value - width / 2, value + width / 2), unit="1/s", status="well determined"
     )
     assert digits(number) == expected
 
@@ -104,7 +104,13 @@ def test_a_verdict_trusts_no_response_that_is_not_explained() -> None:
 
 @pytest.mark.parametrize(
     ("width", "status"),
-    [(0.99, "firm"), (1.01, "weak"), (4.0, "weak"), (1e-11, "firm"), (1e-13, "weak")],
+    [
+        (0.99, "well determined"),
+        (1.01, "poorly determined"),
+        (4.0, "poorly determined"),
+        (1e-11, "well determined"),
+        (1e-13, "poorly determined"),
+    ],
 )
 def test_an_interval_wider_than_its_value_or_narrower_than_rounding_is_weak(width: float, status: str) -> None:
     """`width` of the whole interval, of the value; it ends at zero, which no asked number passes."""
@@ -125,7 +131,7 @@ def test_a_number_that_ended_below_a_millionth_of_its_guess_is_at_its_bound() ->
     small = {n: 0.9e-6 * GUESS[n] if n == "b_1" else v for n, v in way.values.items()}
     squares = replace(found.squares, way=replace(way, values=small), covariance=1e-20 * np.eye(2))
     fit = _fit(found.rig, squares, {}, found.key, 2.0, ())
-    assert (fit.estimates["b_1"].status, fit.estimates["J_d"].status) == ("at bound", "firm")
+    assert (fit.estimates["b_1"].status, fit.estimates["J_d"].status) == ("at bound", "well determined")
 
 
 def test_what_the_response_does_not_depend_on_correlates_with_nothing() -> None:

@@ -258,10 +258,11 @@ def test_slopes_of_the_outputs_are_in_their_own_unit() -> None:
     assert met.error[:, 0] == pytest.approx(expected, abs=1e-6)
 
 
-def test_a_filtered_run_is_met_at_its_shortest_horizon() -> None:
+def test_a_filtered_run_is_met_as_far_ahead_as_it_is_judged() -> None:
     run = rolled(0, horizon=(0.1, 0.3), restart="kalman")
-    problem = formulate(with_noise(cart(), [run]), [run])
-    told, met = score_run(problem, 0, problem.start), sensitivity(problem, 0, problem.start)
+    asked = formulate(with_noise(cart(), [run]), [run])
+    told, problem = score_run(asked, 0, asked.start, 0.1), asked.ahead(0.1)
+    met = sensitivity(problem, 0, problem.start)
     assert met.error == pytest.approx(told.simulated - told.y, abs=1e-9)
     assert met.age == pytest.approx(np.full(len(told.t), 0.1))
     assert (told.horizon, set(told.ahead)) == (0.1, {0.1, 0.3})

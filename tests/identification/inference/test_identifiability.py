@@ -44,7 +44,7 @@ def test_one_number_given_restores_sight() -> None:
     guesses = {n: 1.3 * PENDULUM[n] for n in ("J_p", "b_2", "b_2c")}
     fit = identify(rig(Pendulum, PENDULUM, guesses), [noisy(swing(), 1e-4, seed=1)])
     assert not fit.unseen
-    assert all(e.status == "firm" for e in fit.estimates.values())
+    assert all(e.status == "well determined" for e in fit.estimates.values())
 
 
 @pytest.mark.slow
@@ -60,7 +60,7 @@ def test_a_parameter_without_effect_is_named() -> None:
     still = replace(still, y=x[:, [2], 0])
     fit = identify(rig(Furuta, FURUTA, {"J_d": 0.01, "b_2": 3e-4, "b_2c": 1e-4}), [noisy(still, 1e-4, seed=2)])
     assert fit.estimates["J_d"].status == "unseen"
-    assert fit.estimates["b_2c"].status == "firm"
+    assert fit.estimates["b_2c"].status == "well determined"
     assert any("J_d" in s and "no measured output" in s for s in fit.unseen)
 
 
@@ -70,7 +70,7 @@ def test_back_emf_and_friction_cannot_be_told_apart() -> None:
     asked = rig(Furuta, FURUTA, {"b_1": 4e-3, "actuator.slope": 1e-3, "J_d": 0.01})
     fit = identify(asked, [run])
     assert {"b_1", "actuator.slope"} <= {n for n, e in fit.estimates.items() if e.status == "unseen"}
-    assert fit.estimates["J_d"].status == "firm"
+    assert fit.estimates["J_d"].status == "well determined"
     assert any("b_1" in s and "actuator.slope" in s for s in fit.unseen)
 
 
@@ -79,7 +79,7 @@ def test_a_weakly_seen_number_is_called_weak() -> None:
     run = noisy(swing({**PENDULUM, "b_2c": 0.0}, angle=0.1, seconds=5.0), 0.01, seed=4)
     fit = identify(rig(Pendulum, PENDULUM, {"b_2q": 1e-3, "J_p": 2e-3}, b_2c=0.0), [run], method="least-squares")
     e = fit.estimates["b_2q"]
-    assert e.status in ("weak", "at bound", "unseen")
+    assert e.status in ("poorly determined", "at bound", "unseen")
     assert e.interval[0] <= PENDULUM["b_2q"] <= e.interval[1]
 
 

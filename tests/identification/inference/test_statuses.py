@@ -44,7 +44,7 @@ def with_sigma(best: Optimum, sigma: float) -> Optimum:
 
 
 def test_a_well_seen_number_is_firm(best: Optimum) -> None:
-    assert {e.status for e in everything(best).values()} == {"firm"}
+    assert {e.status for e in everything(best).values()} == {"well determined"}
 
 
 @pytest.mark.parametrize("sigma", [0.0, 1e-16])
@@ -55,16 +55,16 @@ def test_an_interval_without_width_says_nothing(best: Optimum, sigma: float) -> 
 
 
 def test_an_interval_of_a_few_parts_in_a_billion_is_one(best: Optimum) -> None:
-    assert {e.status for n, e in everything(with_sigma(best, 1e-9)).items()} == {"firm"}
+    assert {e.status for n, e in everything(with_sigma(best, 1e-9)).items()} == {"well determined"}
 
 
 def test_no_number_is_firm_where_the_runs_are_missed_by_more_than_they_vary(best: Optimum) -> None:
     """A mean squared residual of 1, in units of the signal's spread, is what its mean alone misses."""
-    assert {e.status for e in everything(replace(best, variance=0.99)).values()} == {"firm"}
-    assert {e.status for e in everything(replace(best, variance=1.01)).values()} == {"weak"}
+    assert {e.status for e in everything(replace(best, variance=0.99)).values()} == {"well determined"}
+    assert {e.status for e in everything(replace(best, variance=1.01)).values()} == {"poorly determined"}
 
 
-@pytest.mark.parametrize(("half", "status"), [(0.49, "firm"), (0.51, "weak")])
+@pytest.mark.parametrize(("half", "status"), [(0.49, "well determined"), (0.51, "poorly determined")])
 def test_a_first_angle_is_weak_when_its_interval_is_wider_than_what_would_matter(
     best: Optimum, half: float, status: str
 ) -> None:
@@ -75,7 +75,7 @@ def test_a_first_angle_is_weak_when_its_interval_is_wider_than_what_would_matter
     assert e.status == status
 
 
-@pytest.mark.parametrize(("half", "status"), [(0.49, "firm"), (0.51, "weak")])
+@pytest.mark.parametrize(("half", "status"), [(0.49, "well determined"), (0.51, "poorly determined")])
 def test_an_inertia_is_weak_when_its_interval_is_wider_than_itself(best: Optimum, half: float, status: str) -> None:
     """J_p is sought as it is, so its interval is twice as wide as it reaches to one side."""
     size = float(best.values[0])
@@ -84,7 +84,7 @@ def test_an_inertia_is_weak_when_its_interval_is_wider_than_itself(best: Optimum
 
 
 @pytest.mark.parametrize("size", [0.03, 1.0, 20.0])
-@pytest.mark.parametrize(("share", "status"), [(0.98, "firm"), (1.02, "weak")])
+@pytest.mark.parametrize(("share", "status"), [(0.98, "well determined"), (1.02, "poorly determined")])
 def test_a_factor_of_a_run_is_weak_when_its_interval_is_wider_than_itself(
     best: Optimum, size: float, share: float, status: str
 ) -> None:
@@ -107,11 +107,11 @@ def test_a_factor_of_a_run_is_weak_when_its_interval_is_wider_than_itself(
 @pytest.mark.parametrize(
     ("half", "upper", "profiled", "status"),
     [
-        (0.6, math.inf, 0.9, "firm"),  # too wide by its standard error alone
-        (0.6, math.inf, 1.1, "weak"),
-        (0.1, 1.05, 1.1, "weak"),  # it reaches past its bound, so the standard error tells little
-        (0.1, 1.05, 0.3, "firm"),
-        (0.1, math.inf, None, "firm"),  # far from all bounds: not followed
+        (0.6, math.inf, 0.9, "well determined"),  # too wide by its standard error alone
+        (0.6, math.inf, 1.1, "poorly determined"),
+        (0.1, 1.05, 1.1, "poorly determined"),  # it reaches past its bound, so the standard error tells little
+        (0.1, 1.05, 0.3, "well determined"),
+        (0.1, math.inf, None, "well determined"),  # far from all bounds: not followed
     ],
 )
 def test_a_profile_that_was_followed_says_whether_a_number_is_weak(
@@ -160,8 +160,8 @@ def test_a_number_at_its_bound_may_lie_at_the_far_end_of_its_interval_and_others
     assert beyond_bounds(held, estimates)["b_2"] == pytest.approx(widened)
     asked, log = best.problem.rig, SearchLog()
     for status, told in (
-        ("firm", widened),
-        ("weak", widened),
+        ("well determined", widened),
+        ("poorly determined", widened),
         ("known", (1.9e-3, 2.1e-3)),
         ("unseen", (1.9e-3, 2.1e-3)),
     ):
@@ -218,7 +218,7 @@ def test_the_verdict_says_why_a_number_without_width_cannot_be_used() -> None:
 
 
 def test_the_verdict_says_that_a_fit_that_explains_nothing_determines_nothing() -> None:
-    narrow = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2", status="weak")
+    narrow = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2", status="poorly determined")
     told = judged({"J_p": narrow}, nothing=True)
     assert (told[0].answer, told[1].answer) == ("no", "no")
     assert told[1].reasons == (
@@ -246,7 +246,7 @@ def test_a_loop_can_be_designed_where_the_growth_is_known_to_a_tenth_and_rigs_wi
     told = judged({}, standing=Standing(at="inverted", growth=growth, share=share))[2]
     assert told.answer == answer
     assert bool(told.advice) == (answer != "yes")
-    assert f"holds {100 * share:.0f} % of the rigs" in told.headline
+    assert f"stabilises {100 * share:.0f} % of the rigs" in told.headline
     # of a search that had not settled no loop follows; of one that was interrupted nothing was looked at
     for state, doubt in (({"converged": False}, "no"), ({"interrupted": True}, "not tested")):
         doubtful = judged({}, standing=Standing(at="inverted", growth=growth, share=share), **state)[2]

@@ -203,7 +203,7 @@ def test_a_profile_costs_forty_simulations_of_so_many_lanes() -> None:
     assert profile_work(best) == pytest.approx(40 * N * 4 / 16)
 
 
-@pytest.mark.parametrize(("half", "status"), [(0.49, "firm"), (0.51, "weak")])
+@pytest.mark.parametrize(("half", "status"), [(0.49, "well determined"), (0.51, "poorly determined")])
 def test_an_interval_that_grows_wider_than_its_value_makes_a_number_weak(half: float, status: str) -> None:
     e = Estimate(value=-2.0, stderr=0.1, interval=(-2.1, -1.9))
     wide = widened(e, (-2.0 - 2 * half, -2.0 + 2 * half))
@@ -218,7 +218,11 @@ def test_what_is_hidden_has_no_interval_and_what_is_known_keeps_its_own() -> Non
     mass = replace(asked.parameters["m_1"], uncertainty=0.01)
     best = fitted(replace(asked, parameters={**asked.parameters, "m_1": mass}))
     told = shared_estimates(best, ("k_1",), SearchLog(), profiles=False)
-    assert {n: e.status for n, e in told.items()} == {"m_1": "known", "k_1": "unseen", "actuator.gain": "firm"}
+    assert {n: e.status for n, e in told.items()} == {
+        "m_1": "known",
+        "k_1": "unseen",
+        "actuator.gain": "well determined",
+    }
     assert told["k_1"].interval == (-math.inf, math.inf)
     assert told["m_1"].stderr == pytest.approx(0.01, rel=0.2)
 
@@ -245,13 +249,13 @@ def assumed(name: str, value: float, unit: str, redefines: tuple[str, ...] = (),
     [
         (
             assumed("actuator.gain", 0.5, "N/V", m=1.0, k=0.985, w=0.0, z=-0.015),
-            "actuator.gain = 0.5 N/V is assumed, not known; m, k are proportional to it, ratios are firm; w, z do not "
-            'depend on it. Measure actuator.gain and give it as known, gain = "... N/V" under [actuator].',
+            "actuator.gain = 0.5 N/V is assumed, not known; m, k are proportional to it, so their ratios are known; w, "
+            'z do not depend on it. Measure actuator.gain and give it as known, gain = "... N/V" under [actuator].',
         ),
         (
             assumed("m_p", 2.0, "1", J=1.0, w=0.0, b=-0.5),
-            "m_p = 2 is assumed, not known; J is proportional to it, ratios are firm; for every percent of it b by "
-            '-0.5 % would follow; w does not depend on it. Measure m_p and give it as known, m_p = "..." under '
+            "m_p = 2 is assumed, not known; J is proportional to it, so their ratios are known; for every percent of "
+            'it b by -0.5 % would follow; w does not depend on it. Measure m_p and give it as known, m_p = "..." under '
             "[parameters].",
         ),
         (

@@ -140,7 +140,7 @@ def test_an_interrupted_search_is_judged_on_its_prediction_alone() -> None:
     assert told[0].reasons == ("The search was interrupted; this is its best so far.",)
     assert told[0].headline.endswith("Not to be trusted as it stands.")
     assert {a.headline for a in told[1:]} == {"Not evaluated: interrupted."}
-    bad = judged(interrupted=True, estimates={"J_p": firm(status="weak")})[1]
+    bad = judged(interrupted=True, estimates={"J_p": firm(status="poorly determined")})[1]
     assert bad.answer == "no"
     assert bad.reasons[:2] == (
         "Not evaluated: interrupted. This is from the best so far.",
@@ -178,7 +178,9 @@ def test_numbers_of_a_model_that_does_not_predict_are_usable_in_part_and_so_is_i
     assert told[1].reasons[0] == "They are numbers of a model that does not predict."
     assert told[2].reasons[0] == "The model does not predict."
     assert len(told[2].reasons) == 2
-    assert "does not predict" not in "".join(judged(poor, {"J_p": firm(status="weak")})[1].reasons)  # it was a no
+    assert "does not predict" not in "".join(
+        judged(poor, {"J_p": firm(status="poorly determined")})[1].reasons
+    )  # it was a no
 
 
 def test_trust_asks_the_first_two_questions_only() -> None:
@@ -187,17 +189,18 @@ def test_trust_asks_the_first_two_questions_only() -> None:
     assert [a.answer for a in told] == ["not tested", "yes", "no"]
     assert trusted(told)
     assert not trusted(judged({"a": score(theta=50.0)}))
-    assert not trusted(judged(estimates={"J_p": firm(status="weak")}))
+    assert not trusted(judged(estimates={"J_p": firm(status="poorly determined")}))
 
 
 def test_all_numbers_can_be_used_and_none_was_asked() -> None:
     told = judged(estimates={"J_p": firm(), "b_2": firm(), "m_p": firm(status="known")})[1]
-    assert (told.answer, told.headline, told.advice) == ("yes", "All numbers can be used: J_p, b_2.", "")
+    assert (told.answer, told.advice) == ("yes", "")
+    assert told.headline == "All numbers can be used: J_p, b_2. Each is known to 5 % or better."
     nothing = judged(estimates={"m_p": firm(status="known"), "b_2": firm(status="left out")})[1]
     assert (nothing.answer, nothing.headline) == ("yes", "Nothing was asked.")
 
 
-WEAK = {"status": "weak", "unit": "kg m^2"}
+WEAK = {"status": "poorly determined", "unit": "kg m^2"}
 ADVICE = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
 
 
@@ -217,7 +220,7 @@ def test_a_number_over_a_decade_is_not_determined(name: str, low: float, high: f
     told = judged(estimates={"l_cg": firm(), name: vague})[1]
     assert (told.answer, told.reasons, told.advice) == (answer, (said,), ADVICE)
     if answer == "in part":
-        assert told.headline == "These numbers can be used: l_cg."
+        assert told.headline == "These numbers can be used: l_cg. It is known to 5 % or better."
     else:
         assert told.headline == "Not all of them are determined."
 
@@ -267,7 +270,7 @@ def assumed(name: str, **follows: float) -> Assumption:
 def test_what_rests_on_an_assumed_number_is_not_used_before_that_is_measured() -> None:
     e = {"J_p": firm(), "b_2": firm()}
     one = judged(estimates=e, assumptions=[assumed("m_p", J_p=0.5, b_2=0.0)])[1]
-    assert (one.answer, one.headline) == ("in part", "These numbers can be used: b_2.")
+    assert (one.answer, one.headline) == ("in part", "These numbers can be used: b_2. It is known to 5 % or better.")
     assert one.reasons == ("J_p rests on m_p (assumed).",)
     both = judged(estimates=e, assumptions=[assumed("m_p", J_p=0.5), assumed("l_cg", b_2=0.3, J_p=0.2)])[1]
     assert both.headline == "None of them before l_cg is measured."
@@ -279,7 +282,7 @@ def test_what_rests_on_an_assumed_number_is_not_used_before_that_is_measured() -
 def test_numbers_bent_by_a_dead_time_are_not_used() -> None:
     e = {"J_p": firm(), "b_2": firm()}
     some, all_ = (judged(estimates=e, bent=bent)[1] for bent in (("J_p",), ("J_p", "b_2")))
-    assert (some.answer, some.headline) == ("in part", "These numbers can be used: b_2.")
+    assert (some.answer, some.headline) == ("in part", "These numbers can be used: b_2. It is known to 5 % or better.")
     assert some.reasons[0].startswith("J_p: outside their intervals once the drive may act late")
     assert (all_.answer, all_.headline) == ("no", "None of them before the drive's delay is asked for.")
 
@@ -308,7 +311,7 @@ def test_a_guessed_plant_is_in_part_whatever_its_numbers() -> None:
     assert (told.answer, told.headline) == ("in part", "As numbers of a plant that was guessed.")
     confirmed = {"a": score(theta=99.0), "b": score("predict", theta=95.0)}
     assert judged(confirmed, {"J_p": firm()}, rig=guessed)[1].answer == "yes"
-    assert judged(estimates={"J_p": firm(status="weak")}, rig=guessed)[1].answer == "no"
+    assert judged(estimates={"J_p": firm(status="poorly determined")}, rig=guessed)[1].answer == "no"
 
 
 def growing(value: float, low: float, high: float, stderr: float, **more: Any) -> Judgement:
@@ -382,12 +385,12 @@ def test_without_bands_a_signal_may_fall_behind_the_worst_fitted_one_by_fifteen(
     assert not promise({"r": score("predict", psi=79.9)}, None).holds
 
 
-@pytest.mark.parametrize("status", ["at bound", "firm", "weak"])
+@pytest.mark.parametrize("status", ["at bound", "well determined", "poorly determined"])
 def test_a_mass_that_went_to_nothing_fails_the_fit_in_a_sentence(status: str) -> None:
     guessed = rig(Furuta, FURUTA, {"J_d": 2e-3})
     told = judged(estimates={"J_d": firm(5e-13, status=status, unit="kg m^2")}, rig=guessed)
     assert told[1].answer == "no"
     assert not trusted(told)
     assert any(r.startswith("J_d went to nothing, 5e-13 kg m^2, from a guess of 0.002:") for r in told[1].reasons)
-    small = judged(estimates={"J_d": firm(4e-9, status="weak", unit="kg m^2")}, rig=guessed)
+    small = judged(estimates={"J_d": firm(4e-9, status="poorly determined", unit="kg m^2")}, rig=guessed)
     assert not any("went to nothing" in r for r in small[1].reasons)  # 2 millionths are small, and still a number

@@ -37,7 +37,7 @@ def fitted(**known: float) -> Fit:
 def test_the_right_model_keeps_both_frictions() -> None:
     fit = fitted()
     for name in FRICTION:
-        assert fit.estimates[name].status == "firm"
+        assert fit.estimates[name].status == "well determined"
         assert fit.estimates[name].value == pytest.approx(TRUTH[name], rel=0.05)
 
 
@@ -46,7 +46,7 @@ def test_a_wrong_model_says_nothing_false_about_friction() -> None:
     for name in FRICTION:
         low, high = fit.estimates[name].interval
         assert low <= TRUTH[name] <= high
-    assert fit.estimates["b_1"].status == "weak"  # the lean takes its part
+    assert fit.estimates["b_1"].status == "poorly determined"  # the lean takes its part
 
 
 @pytest.mark.slow

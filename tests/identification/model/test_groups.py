@@ -111,7 +111,7 @@ def test_a_sensor_that_counts_too_much_in_some_runs_is_found(windows):
     fit = identify(rig(Furuta, FURUTA, {"J_d": 0.01, "b_1": 4e-3}), runs)
     scale = fit.groups["new encoder"]["scale.theta"]
     assert scale.value == pytest.approx(1.3, rel=2e-3)
-    assert scale.status == "firm"
+    assert scale.status == "well determined"
     assert fit.estimates["J_d"].value == pytest.approx(FURUTA["J_d"], rel=0.02)
 
 
@@ -135,7 +135,7 @@ def test_a_fit_file_keeps_what_groups_share(two_days, tmp_path):
         title="", plant="pendulum", path=tmp_path, sha256="", source="", runs=runs, hardware=Hardware()
     )
     content = write_fit(fit, study, tmp_path / "fit.json")
-    assert content["groups"]["Monday"]["friction"]["status"] == "firm"
+    assert content["groups"]["Monday"]["friction"]["status"] == "well determined"
     assert content["runs"][runs[-1].label]["adapted"] == ["initial"]
     stored = read_fit(tmp_path / "fit.json")
     again = predict(stored.values, fit.model, [runs[-1]], groups=stored.groups)[runs[-1].label]

@@ -95,10 +95,10 @@ def test_a_run_knows_its_period_its_horizons_and_what_moved() -> None:
 
 def test_an_estimate_is_qualified_by_what_it_rests_on() -> None:
     e = Estimate.within(-2.0, 0.1, 0.3, "kg")
-    assert (e.interval, e.unit, e.qualified) == ((-2.3, -1.7), "kg", "firm")
+    assert (e.interval, e.unit, e.qualified) == ((-2.3, -1.7), "kg", "well determined")
     rests = replace(e, rests_on=("m", "g"))
-    assert rests.qualified == "rests on m, g (assumed)"
-    assert replace(rests, status="weak").qualified == "weak, rests on m, g (assumed)"
+    assert rests.qualified == "rests on m, g"
+    assert replace(rests, status="poorly determined").qualified == "poorly determined, rests on m, g"
     assert not e.zero_wide
     for half, none in ((0.9e-12, True), (1.1e-12, False)):  # of 2, a part in 10^12 on both sides together
         assert Estimate.within(-2.0, 0.1, half).zero_wide == none

@@ -145,7 +145,7 @@ def test_the_moment_of_a_trip_is_estimated_with_the_friction(tripped):
     for label, end in (("trips at 2.5 s", 2.5), ("trips at 1.9 s", 1.9)):
         e = fit.per_run[label]["input_end"]
         assert e.unit == "s"
-        assert e.status == "firm"
+        assert e.status == "well determined"
         # four standard errors: one miss in 16,000
         assert abs(e.value - end) < 4 * e.stderr + 1e-4
         assert e.stderr < 5e-3

@@ -32,7 +32,18 @@ def test_the_page_says_what_a_reader_asks_first(fit, written):
     for name in fit.estimates:
         assert name in page.prose
         assert fit.model.parameters[name].meaning in page.prose
-    for needed in ("kg m²", "N m s/rad", "release", "c0ffee", "fitted", "predicted", "93.5 %", "firm", "weak", "∞"):
+    for needed in (
+        "kg m²",
+        "N m s/rad",
+        "release",
+        "c0ffee",
+        "fitted",
+        "predicted",
+        "93.5 %",
+        "well determined",
+        "poorly determined",
+        "∞",
+    ):
         assert needed in page.prose
     for sentence in (*fit.unseen, *fit.warnings):
         assert sentence in page.prose
@@ -94,7 +105,9 @@ def test_intervals_without_end_and_numbers_that_are_none_are_written(changed, wr
     odd = {
         "J_d": Estimate(value=0.0, stderr=math.inf, interval=(-math.inf, math.inf), unit="kg m^2", status="unseen"),
         "J_p": Estimate(value=-1e300, stderr=math.nan, interval=(math.nan, math.nan), unit="1", status="at bound"),
-        "actuator.gain": Estimate(value=1e-300, stderr=0.0, interval=(0.0, 0.0), unit="N m/V", status="firm"),
+        "actuator.gain": Estimate(
+            value=1e-300, stderr=0.0, interval=(0.0, 0.0), unit="N m/V", status="well determined"
+        ),
     }
     _, page = written(changed(estimates=odd, names=("J_d", "J_p"), correlation=np.full((2, 2), np.nan)))
     assert "−∞ to ∞" in page.prose

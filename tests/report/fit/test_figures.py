@@ -156,16 +156,16 @@ def test_correlations_of_a_long_run_end_at_four_hundred_or_two_thousand_samples(
     assert panel.lines[-1].get_xdata()[-1] == pytest.approx(0.01 * lags)
 
 
-def estimate(value, low, high, status="firm"):
+def estimate(value, low, high, status="well determined"):
     return Estimate(value=value, stderr=0.1, interval=(low, high), unit="kg", status=status)
 
 
 ESTIMATES = {
     "m_p": estimate(2.0, 1.8, 2.4),
     "b_1": estimate(9.0, 8.0, 10.0, "known"),
-    "tilt_x": estimate(-4.0, -5.0, -3.6, "weak"),
+    "tilt_x": estimate(-4.0, -5.0, -3.6, "poorly determined"),
     "b_2": estimate(0.0, 0.0, 1.0),
-    "J_p": estimate(3.0, 0.0, math.inf, "weak"),
+    "J_p": estimate(3.0, 0.0, math.inf, "poorly determined"),
 }
 
 
@@ -185,7 +185,8 @@ def test_an_interval_stands_in_percent_of_the_size_of_its_value():
     ax = drawing.axes[0]
     # known and zero have none; the farthest end that stays in the picture is J_p's, 100 % below, a quarter more shows
     assert [t.get_text() for t in ax.get_yticklabels()] == [
-        "$m_{\\mathrm{p}}$  (firm)", "$\\mathrm{tilt}_{\\mathrm{x}}$  (weak)", "$J_{\\mathrm{p}}$  (weak)",
+        "$m_{\\mathrm{p}}$  (well determined)", "$\\mathrm{tilt}_{\\mathrm{x}}$  (poorly determined)",
+        "$J_{\\mathrm{p}}$  (poorly determined)",
     ]  # fmt: skip
     assert ax.get_xlim() == pytest.approx((-125.0, 125.0))
     assert ax.get_ylim() == (2.5, -0.5)

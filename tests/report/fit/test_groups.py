@@ -8,7 +8,7 @@ from upright.identification import Estimate
 from upright.report.fit.chapter import fit_steps
 from upright.report.fit.tables import run_table, score_table
 
-FACTOR = Estimate(value=1.2, stderr=0.02, interval=(1.16, 1.24), unit="1", status="firm")
+FACTOR = Estimate(value=1.2, stderr=0.02, interval=(1.16, 1.24), unit="1", status="well determined")
 
 
 def test_groups_stand_before_single_runs(changed):

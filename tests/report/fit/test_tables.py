@@ -19,11 +19,12 @@ from upright.report.fit.tables import (
     parameter_table,
     plain_estimate,
     pole_table,
+    ratio_table,
     run_table,
     score_table,
     within,
-    without_table,
 )
+from upright.report.symbols import plain
 
 MASS = Estimate(value=0.25, stderr=0.01, interval=(0.23, 0.27), unit="kg m^2")
 
@@ -54,7 +55,8 @@ def test_parameters_stand_with_error_interval_unit_and_how_they_are_known(two):
     table = parameter_table(two)
     assert table.headings == ("symbol", "value", "std. error", "95 % interval", "unit", "status", "name and meaning")
     assert table.rows[0] == (
-        "J_d", "0.250", "0.010", "0.230 to 0.270", "kg m²", "firm", "J_d, inertia, known beforehand",
+        "J_d", "0.250", "0.010", "0.230 to 0.270", "kg m²", "well determined (±8 %)",
+        "J_d, inertia, known beforehand",
     )  # fmt: skip
     assert table.rows[1:] == (
         ("m_p", "0.1000", "1.5·10⁻³", "", "kg", "given", "m_p, mass"), ("r", "0.1600", "exact", "", "m", "given", "r"),
@@ -105,22 +107,34 @@ def test_an_estimate_on_the_cover_has_the_figures_that_its_error_leaves():
 
 
 def test_what_rests_on_assumed_numbers_stands_without_them(two):
-    assumed = Assumption(name="actuator.gain", value=1.0, unit="N m/V", follows={"J_d": 1.0}, without={"J_d": MASS})
-    table = without_table(replace(two, assumptions=(assumed,)))
-    assert table.rows == (
-        ("J_d", "0.250", "0.010", "0.230 to 0.270", "kg m²", "firm", "J_d, inertia, known beforehand"),
+    ratios = {"J_d/gain": MASS, "b_1/gain": replace(MASS, rests_on=("J_a",), status="rests on J_a")}
+    assumed = Assumption(
+        name="actuator.gain",
+        value=1.0,
+        unit="N m/V",
+        follows={"J_d": 1.0},
+        without={},
+        ratios=ratios,
+        range=(0.1, 10.0),
     )
+    table = ratio_table(replace(two, assumptions=(assumed,)))
+    assert table.rows == (
+        (plain("J_d/gain"), "0.250", "0.010", "0.230 to 0.270", "kg m²", "well determined (±8 %)"),
+        (plain("b_1/gain"), "0.250", "0.010", "0.230 to 0.270", "kg m²", "rests on J_a"),
+    )
+    of_the_rig = parameter_table(replace(two, assumptions=(assumed,)))
+    assert [row[3] for row in of_the_rig.rows if row[0] == "actuator.gain"] == []  # as it is by default
     assert [table.headings[i] for i in table.numbers] == ["value", "std. error", "95 % interval"]
     assert table.headings[table.badge] == "status"
 
 
 def test_numbers_of_groups_and_runs_stand_under_their_headings(changed):
     table = run_table(
-        changed(groups={"day": {"friction": MASS}}, per_run={"a": {"theta": replace(MASS, status="weak")}})
+        changed(groups={"day": {"friction": MASS}}, per_run={"a": {"theta": replace(MASS, status="poorly determined")}})
     )
     assert cells(table) == {
         "run": "group day", "symbol": "friction", "value": "0.250", "std. error": "0.010",
-        "95 % interval": "0.230 to 0.270", "unit": "kg m²", "status": "firm",
+        "95 % interval": "0.230 to 0.270", "unit": "kg m²", "status": "well determined (±8 %)",
     }  # fmt: skip
     assert table.rows[1][0] == "a"
     assert [table.headings[i] for i in table.numbers] == ["value", "std. error", "95 % interval"]
@@ -364,7 +378,7 @@ def test_a_factor_that_would_mend_a_prediction_is_offered(changed):
 
 
 def test_weak_numbers_are_named_where_nothing_else_is_unseen(changed):
-    weak = {"J_d": replace(MASS, status="weak"), "J_p": replace(MASS, status="unseen"), "b_1": MASS}
+    weak = {"J_d": replace(MASS, status="poorly determined"), "J_p": replace(MASS, status="unseen"), "b_1": MASS}
     (told,) = [s for s in said(changed(estimates=weak, unseen=())) if "hardly see" in s]
     assert "The data hardly see J_d, J_p: measure" in told
     assert "J_d = { value" in told

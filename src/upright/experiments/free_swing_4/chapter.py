@@ -1,4 +1,4 @@
-"""Experiment 4 as a chapter: what the swing told, what it cannot know, and why disk or cart wander."""
+"""Experiment 4 as a chapter: what the swing shows, what it cannot know, and why disk or cart wander."""
 
 from __future__ import annotations
 

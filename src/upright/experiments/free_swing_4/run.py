@@ -41,7 +41,7 @@ FRICTION = ("b_1", "b_1c", "b_2", "b_2c")
 
 @dataclass(frozen=True, kw_only=True)
 class Question:
-    """One fit of the experiment: what it shows, which logs it sees, what is known and asked."""
+    """One fit of the experiment: what it shows, which logs it sees, what is known and estimated."""
 
     name: str
     title: str
@@ -282,7 +282,7 @@ def run_free_swing(
     folder : Path
         Takes logs and studies.
     progress : callable, optional
-        Told the step at work and the share of the experiment done.
+        Called with the current step and the share of the experiment completed.
     stopped : callable, optional
         Asked after each fit whether to stop there; a fit may finish on its best so far when Ctrl-C is pressed.
     weighed : Known, optional

@@ -41,7 +41,7 @@ PROBED, PERIODS = 2, 8
 
 @dataclass(frozen=True, kw_only=True)
 class Asking:
-    """What the rig is asked: a band [rad/s], amplitudes wanted [m or rad], and one period of the command that asks."""
+    """Excitation of the rig: a band [rad/s], amplitudes wanted [m or rad], and one period of the command."""
 
     band: tuple[float, float]
     reach: Array
@@ -146,7 +146,7 @@ def _run(label: str, log: Record, request: Asking, periods: int) -> dict[str, An
 
 
 def _from_rest(stand: TestStand, wave: Array, periods: int) -> list[float]:
-    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those asked for.
+    """Samples that begin at rest, since a drive with a lag looks back, and grow over a period before those requested.
 
     What begins at once gives a free axis a push, on which it drifts out of its travel.
     """

@@ -1,4 +1,4 @@
-"""Experiment 1b as a chapter: what was asked, what came back, both fits side by side, and the pole to be held."""
+"""Experiment 1b as a chapter: excitation, response, both fits side by side, and the pole to be stabilised."""
 
 from __future__ import annotations
 
@@ -263,7 +263,7 @@ def _way_table(answer: FrequencyFit) -> Table:
 
 
 def _parameter_table(answer: FrequencyFit, truth: Mapping[str, float] | None = None) -> Table:
-    """Every number, by both ways; a magnitude of the linear model is not asked for all of them."""
+    """Every number, by both ways; a magnitude of the linear model does not determine all of them."""
     unasked = {j.coulomb for j in answer.rig.plant.joints} | {"actuator.lag", "actuator.delay"}
     unasked |= {n for n, p in answer.rig.parameters.items() if not p.estimate}
     walked = {n: "–" if n in unasked else number(answer.simplex.values[n]) for n in answer.fit.estimates}

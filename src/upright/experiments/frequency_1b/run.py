@@ -45,7 +45,7 @@ class FrequencyRun:
     folder : Path
         Holds `frequency.csv`, `sweep.csv` and `fit.json`.
     kind : str
-        How it was asked: sines, multisine or sweep.
+        Excitation: sines, multisine or sweep.
     seconds : float
         Time at the computer [s].
     """
@@ -83,7 +83,7 @@ def run_frequency(
     seed : int
     folder : Path
     progress, stopped : callables
-        Told the step at work and the share done; asked between two steps whether to stop.
+        Called with the current step and the share completed; asked between two steps whether to stop.
     weighed : sequence of Known
         What experiment 1a found; it joins what the bench says.
     kind : {"sines", "multisine", "sweep"}
@@ -134,7 +134,7 @@ class LogRequest:
     counts : mapping of str to float
         Counts per rad or m by coordinate, negative when they count the other way.
     kind : str
-        How the rig was asked; told from the command when empty.
+        Excitation; recognised from the command when empty.
     hold : float, optional
         Time for which the converter holds a command [s].
     band : (float, float)
@@ -180,7 +180,7 @@ def response_of_logs(
     data : Path, optional
         Folder of a study's logs.
     tell : Progress
-        Told the step at work.
+        Called with the current step.
     """
     rest: GreyBox | None = None
     plant, hardware = "", Hardware()
@@ -209,9 +209,9 @@ def response_of_logs(
 
 
 def _designed(request: LogRequest) -> GreyBox:
-    """Numbers of a make: as designed where nothing is said, known within a tolerance where the bench usually tells."""
+    """Numbers of a make: nominal where not specified, known within a tolerance where a bench usually measures them."""
     make = make_named(request.make)
-    values = make.plant.parameters()
+    values = make.rig.plant.parameters()
     for name in request.known:
         if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):
             raise BadInput(f"'{request.make}' has no number '{name}'; {nearest(name, values)}")

@@ -2,7 +2,7 @@
 
 A probe at every frequency shows what a volt does there; the stepped sines then ask for the amplitude that keeps clear
 of stiction, of the encoders' resolution, of the drive's limit and of the ends of travel. Each sine goes on until its
-transient has died away, told from the data, and is then measured over whole periods. A periodic multisine, or a sweep
+transient has decayed, detected in the data, and is then measured over whole periods. A periodic multisine, or a sweep
 up and down, is quicker, at a price: each frequency moves the rig less, so dry friction weighs more, and what it adds
 at one frequency stands under the answer at another.
 """
@@ -39,7 +39,7 @@ SWEEP = 40.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Dwell:
-    """One frequency: what was asked, how long it took to settle, what was logged after that."""
+    """One frequency: its command, how long it took to settle, what was logged after that."""
 
     omega: float
     amplitude: float
@@ -52,12 +52,12 @@ class Dwell:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sweep:
-    """A rig asked by frequencies.
+    """A rig excited frequency by frequency.
 
     Attributes
     ----------
     dwells : tuple of Dwell
-        Sines, one after the other; empty when all were asked at once.
+        Sines, one after the other; empty when all were excited at once.
     response : FrequencyResponse
     seconds : float
         Time at the rig.
@@ -144,7 +144,7 @@ def stepped_sine(rig: Rig, make: Make, *, count: int = 28, seconds: float = 40.0
 
 
 def _probed(rig: Rig, lengths: NDArray[np.int64], amplitude: Array, goal: Array, seconds: float) -> Array:
-    """Commands that come closest to the motion asked for, closed in from both sides because friction makes it jump."""
+    """Commands that come closest to the wanted motion, closed in from both sides because friction makes it jump."""
     low, high = np.zeros(lengths.size), np.full(lengths.size, SHARE * rig.limit)
     best, miss = amplitude, np.full(lengths.size, math.inf)
     for _ in range(PROBES):
@@ -193,7 +193,7 @@ def collect(dwells: tuple[Dwell, ...], rig: Rig) -> FrequencyResponse:
 
 
 def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
-    """Log and response of a twin asked at all frequencies of its make's band at once, from rest.
+    """Log and response of a twin excited at all frequencies of its make's band at once, from rest.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def _expected(make: Make, omega: ArrayLike) -> Array:
 
 def _level(make: Make, omega: ArrayLike) -> Array:
     """Relative command at each frequency: as much as the most mobile coordinate stands."""
-    return np.minimum(make.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
+    return np.minimum(make.rig.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
 
 
 def _moved(rig: Rig, u: Array) -> Array:

@@ -139,7 +139,7 @@ def _detail(result: Regulation) -> str:
 
 
 def _sentence(result: Regulation, a: Attempt) -> str:
-    """One pole set: what was told, and what came."""
+    """One pole set: predicted, and measured."""
     b, rig = a.before, result.rig
     reach = (
         f"it recovers tilts up to {math.degrees(b.tilt):.0f}° and taps up to {b.push:.1f} rad/s"
@@ -194,7 +194,7 @@ def _shown(rig: Rig, i: int, value: float) -> str:
 
 
 def _gain_table(result: Regulation) -> Table:
-    """Poles asked, the gains they take, and the margins of the loop as it runs."""
+    """Requested poles, the gains they take, and the margins of the loop as it runs."""
     rows: list[tuple[str, ...]] = []
     for a in result.attempts:
         m = a.before.margins
@@ -214,7 +214,7 @@ def _gain_table(result: Regulation) -> Table:
 
 
 def _prediction_table(result: Regulation) -> Table:
-    """What was told and what came, set by set."""
+    """Predicted and measured, set by set."""
     rows: list[tuple[str, ...]] = []
     for a in result.attempts:
         b = a.before

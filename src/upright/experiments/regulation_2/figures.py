@@ -1,4 +1,4 @@
-"""Pictures of experiment 2: the runs, what was told of them beforehand, and the ways to the velocities."""
+"""Pictures of experiment 2: the runs, their predictions, and the velocity estimators."""
 
 from __future__ import annotations
 

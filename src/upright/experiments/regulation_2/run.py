@@ -1,7 +1,7 @@
 """Experiment 2: the rig held upright with the numbers it was identified by, and beforehand what will come of it.
 
 Gains come from the identified model, the verdict per pole set from the rigs that its covariance allows; then the law
-runs on the rig itself, here the twin's truth, and what came is put beside what was told.
+runs on the rig itself, here the twin's truth, and is compared with its prediction.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ SETS = {f"set {i}": text for i, text in enumerate(TABLE_1, start=1)}
 
 @dataclass(frozen=True, kw_only=True)
 class RegulationRequest:
-    """What is asked: poles by name [1/s], the way to the velocities, and the start (see `START` when None)."""
+    """Request: poles by name [1/s], the velocity estimator, and the start (see `START` when None)."""
 
     poles: Mapping[str, Roots] = field(default_factory=lambda: {n: read_poles(text) for n, text in SETS.items()})
     speed: str = "filtered"
@@ -81,7 +81,7 @@ class Came:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Attempt:
-    """One pole set: gains, what was told beforehand, and what came of it; None where nothing was run."""
+    """One pole set: gains, prediction, and measurement (None where nothing was run)."""
 
     name: str
     placement: Placement
@@ -134,12 +134,12 @@ class Regulation:
     truth : Rig or None
         The twin on which the laws ran, where it was one that is simulated here.
     task : Task
-    wish : Wish
+    request : RegulationRequest
     attempts : tuple of Attempt
     ways : tuple of Way
         For the recommended set, on the truth, or on the model where there is no truth.
     uncertain : bool
-        Whether the identification told of its uncertainty.
+        Whether the identification has a covariance.
     source : str
         What `upright regulate` is given to do this again.
     seed : int
@@ -202,7 +202,7 @@ def _check_upright(known: Rig) -> None:
 
 
 def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
-    """What is asked of a rig when nobody says.
+    """Default request for a rig.
 
     The pole sets of Table 1 are for the makers' rigs; for one of one's own all are as much faster as it falls faster.
     """
@@ -212,7 +212,7 @@ def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
     request = RegulationRequest(tilt=tilt, push=push, seconds=SECONDS_BY_HAND)
     if stand.make is not None:
         return request
-    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].plant)]
+    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].rig.plant)]
     faster = falls[0] / falls[1]
     return replace(request, poles={f"{name} x{faster:.2g}": faster * p for name, p in request.poles.items()})
 
@@ -230,13 +230,13 @@ def run_regulation(
     rig : Rig
         As identified hanging, completed for a run.
     stand : TestStand, optional
-        The rig itself; without it nothing is run and only what is expected is told.
+        The rig itself; without it nothing is run, only predicted.
     seed : int
         Of the hand's errors and of the rigs drawn.
     folder : Path
         Takes the logs of the runs.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
         Asked after every set whether to stop there.
     request : RegulationRequest, optional

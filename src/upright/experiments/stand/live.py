@@ -35,7 +35,7 @@ def nobody_watches() -> AbstractContextManager[Watch]:
 
 
 def nobody(_sentence: str) -> bool:
-    """Hands of a twin: what a person would be asked for is done already."""
+    """Hands of a twin: what a person would do is done already."""
     return True
 
 
@@ -47,7 +47,7 @@ class LiveStand(TestStand):
     ----------
     file : RigFile
     person : callable
-        Asked for something, in a sentence; answers whether it was done.
+        Called with a request, in a sentence; answers whether it was done.
     watching : callable
         Opens a view for a run: a callable that is shown how it goes, and answers with a sentence to end it.
     accept : str
@@ -62,7 +62,7 @@ class LiveStand(TestStand):
 
     @property
     def text(self) -> str:
-        """What is said of it: RIG.toml, and what describes the rig."""
+        """Its description: RIG.toml, and what describes the rig."""
         known = self.file.known
         return read_text(self.file.path) + ("" if known is None else read_text(known))
 

@@ -1,4 +1,4 @@
-"""How strongly a rig is asked whose numbers are guesses: well within the drive's limit and the travel, step by step."""
+"""How strongly to excite a rig whose numbers are guesses: well within the drive's limit and travel, step by step."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def write_study(
 
 
 def _late(stand: TestStand, actuator: Mapping[str, Any]) -> dict[str, Any]:
-    """The drive with its delay: a sample where nobody said it, and found where nothing else is late."""
+    """The drive with its delay: a sample where not specified, and estimated where nothing else is late."""
     if "delay" in actuator or not stand.rig.delay:
         return dict(actuator)
     assumed = f"{stand.rig.delay:.10g} s"

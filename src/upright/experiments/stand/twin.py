@@ -22,7 +22,7 @@ class TwinStand(TestStand):
     simulated = True
 
     def ask(self, sentence: str) -> None:
-        """What a person would be asked for is done by the start of the simulation."""
+        """What a person would do is done by the start of the simulation."""
 
     def run(
         self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0

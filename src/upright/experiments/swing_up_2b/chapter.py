@@ -1,4 +1,4 @@
-"""Experiment 2b as a chapter: the encoders, the way up, and what lying encoders would have done."""
+"""Experiment 2b as a chapter: the encoders, the way up, and what faulty encoders would have done."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from upright.control.sensors import Scales
 from upright.control.swing_up import Ascent
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
+from upright.laws import as_values
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, percent
 from upright.report.symbols import unit as raised
@@ -34,7 +35,7 @@ def chapter(result: SwingUpRun) -> Chapter:
         key="2b", title=f"Swing-up and catch: {result.truth.name}{seed}", question=QUESTION,
         verdict=result.verdict,
         detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
-        sound=result.caught, parts=tuple(parts), steps=_steps(result), findings=_findings(result),
+        sound=result.sound, parts=tuple(parts), steps=_steps(result), findings=_findings(result),
         numbers=_numbers(result),
     )  # fmt: skip
     return resting_on(page, result.model.basis, result.performed)
@@ -92,6 +93,7 @@ def _swing_part(result: SwingUpRun, run: Ascent) -> Part:
         ("handovers, falls", f"{len(run.handovers)}, {len(run.falls)}", ""),
         ("largest command, of its limit", f"{run.peak:.3g} of {law.limit:.3g}", result.model.unit),
         ("share of the time at the limit", percent(100 * run.saturated), ""),
+        *(() if result.rest is None else (("command at rest, rms, of the limit", percent(100 * result.rest.rms), ""),)),
         ("farthest from the middle, of the travel", f"{run.travel:.3g} of {law.travel:.3g}", unit),
         ("ellipsoid of the catch, of what the linear model allows", percent(100 * law.size / law.sure), ""),
     )
@@ -120,7 +122,7 @@ def _swing_part(result: SwingUpRun, run: Ascent) -> Part:
 
 
 def _lie_part(result: SwingUpRun) -> Part:
-    """Lying encoders, tried one by one."""
+    """Faulty encoders, tried one by one."""
     rows = tuple(_row(lie) for lie in result.lies)
     caught = sum(lie.refused for lie in result.lies)
     falling = [lie for lie in result.lies if math.isfinite(lie.fell)]
@@ -166,6 +168,9 @@ def _steps(result: SwingUpRun) -> tuple[Step, ...]:
     out = [Step("See what happens when an encoder lies.", f'{base} --lie "theta=2"')]
     if not result.caught:
         out.append(Step("Allow more travel.", f"{base} --travel {2 * result.law.travel:g}"))
+    else:
+        out.append(Step("Take the law to the computer that closes the loop, in C, for Arduino or in Python.",
+                        "upright export FOLDER/swing_up.json --to c"))  # fmt: skip
     if not result.source:
         out.append(Step("Design from an identification instead of the data sheet.",
                         f"upright swing-up FIT.json --seed {result.truth.seed}"))  # fmt: skip
@@ -179,10 +184,16 @@ def _numbers(result: SwingUpRun) -> dict[str, Any]:
         "upright_after": run.up, "held": result.caught, "half_swings": run.swings,
         "handovers": run.handovers, "falls": run.falls, "tripped": run.tripped,
         "peak_command": run.peak, "share_saturated": run.saturated, "travel": run.travel,
+        "rest": None if result.rest is None else {"quiet": result.rest.quiet, **vars(result.rest)},
     }  # fmt: skip
+    rig = result.model
     return {
         "rig": result.truth.name, "seed": result.truth.seed, "verdict": result.verdict,
         "sensors": _scales(result.check), "swing_up": up,
+        "rule": as_values(law.rule(rig, rig.plant.state(next(iter(rig.plant.equilibria))))),
+        "period": rig.period, "limit": law.limit,
+        "command_unit": rig.unit, "described": rig.hardware.plain(),
+        "readings": [{"name": c.name, "unit": c.unit} for c in rig.plant.coordinates],
         "law": {
             "K": law.K, "P": law.P, "size": law.size, "sure": law.sure, "reach": law.reach,
             "limit": law.limit, "travel": law.travel, "held_for": HELD, "body": vars(law.body),

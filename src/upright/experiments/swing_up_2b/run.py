@@ -1,4 +1,4 @@
-"""Experiment 2b, from hanging to upright: encoders first, then pump, catch and hold; and what lying encoders do.
+"""Experiment 2b, from hanging to upright: encoders first, then pump, catch and hold; and what faulty encoders do.
 
 The law is designed from what is known of the rig, a fit or the make's data sheet; it runs on the rig itself, here the
 twin's truth.
@@ -16,10 +16,12 @@ import numpy as np
 
 from upright.basis import SIMULATED
 from upright.control import SwingUp, design_swing_up, trial
+from upright.control.effort import RestEffort, rest_effort, shown
 from upright.control.score import FALLEN
-from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, scales, shown_by_encoders
+from upright.control.sensors import KNOWN, Scales, probe, scales, shown_by_encoders
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import readings
+from upright.control.watch import Suspicion, Watch
 from upright.errors import BadInput, NotIdentifiable, RigStopped, nearest
 from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.gains import feedback, filtered
@@ -32,7 +34,7 @@ HELD = 5.0
 """How long the pendulum must stand before it counts as caught [s]."""
 SECONDS = 12.0
 TILT = math.radians(3)
-"""From which a loop with a lying encoder is switched on [rad]."""
+"""From which a loop with a faulty encoder is switched on [rad]."""
 LEAST = math.radians(40)
 """Swing below which the period tells too little of the amplitude [rad]: at 40 degrees it is 3 % longer."""
 LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("theta", 1.1), ("", -1.0), ("", 4.0))
@@ -41,7 +43,7 @@ LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("thet
 
 @dataclass(frozen=True, kw_only=True)
 class Lie:
-    """What becomes of one lying encoder.
+    """What becomes of one faulty encoder.
 
     Attributes
     ----------
@@ -57,7 +59,7 @@ class Lie:
         When the watch of a running loop would have switched off [s]; inf when it would not.
     tilt : float
         True deviation from upright then [rad]; 0 when it would not.
-    said : str
+    suspicion : str
         What the watch took it for.
     fell : float
         When the loop fell without a watch [s]; inf when it stood.
@@ -119,9 +121,18 @@ class SwingUpRun:
         return a is not None and math.isinf(a.tripped) and a.up <= float(a.trial.t[-1]) - HELD
 
     @property
+    def rest(self) -> RestEffort | None:
+        """What holding takes once it stands; None where it does not."""
+        if self.ascent is None or not self.caught:
+            return None
+        run = self.ascent.trial
+        stands = run.t >= self.ascent.up
+        return rest_effort(run.t[stands], run.u[stands], self.law.limit)
+
+    @property
     def sound(self) -> bool:
-        """Whether what was tried came off, whatever its model is worth."""
-        return self.caught
+        """Whether it was caught and stands by a quiet command, whatever its model is worth."""
+        return self.rest is not None and self.rest.quiet
 
     @property
     def verdict(self) -> str:
@@ -143,8 +154,15 @@ class SwingUpRun:
         again = f" at the {len(a.handovers)}. catch" if len(a.handovers) > 1 else ""
         return (
             f"From hanging to upright in {a.up:.2f} s and {a.swings} half swings{again}, {took}; "
-            f"it stood to the end, {float(a.trial.t[-1]) - a.up:.3g} s."
+            f"it stood to the end, {float(a.trial.t[-1]) - a.up:.3g} s.{self._holding()}"
         )
+
+    def _holding(self) -> str:
+        """What holding takes, as a sentence after others."""
+        if self.rest is None:
+            return ""
+        excessive = "" if self.rest.quiet else " That is excessive effort: take finer encoders or slower differences."
+        return f" The command at rest {shown(self.rest, self.law.limit, self.model.unit)}.{excessive}"
 
 
 def known_of(identified: Rig) -> Mapping[str, float]:
@@ -216,7 +234,7 @@ def run_swing_up(
     travel: float | None = None,
     source: str = "",
 ) -> SwingUpRun:
-    """Check the encoders of a hanging rig, swing it up and hold it; then try what lying encoders would do to a twin.
+    """Check the encoders of a hanging rig, swing it up and hold it; then try what faulty encoders would do to a twin.
 
     Parameters
     ----------
@@ -227,9 +245,9 @@ def run_swing_up(
     folder : Path
         Takes ``sensors.csv`` and ``swing_up.csv``.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
-        Asked before the lies whether to leave them out.
+        Called before the faulty encoders: whether to leave them out.
     known : mapping of str to float, optional
         How well the model's numbers are known, see `known_of`; `sensors.KNOWN` when omitted.
     seconds : float

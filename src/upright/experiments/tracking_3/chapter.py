@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from upright.basis import SIMULATED
+from upright.control.effort import QUIET_RMS, of_limit
 from upright.experiments.tracking_3 import tables
 from upright.experiments.tracking_3.figures import (
     RootLocus,
@@ -63,8 +64,8 @@ def _verdict(result: Tracking) -> str:
         head = f"A step of {length(result, size)} is too much for {', '.join(map(_beyond, bad))}"
     got, effort = best.measured.figures, percentage(best.measured.effort.share, 0)
     if got is None:
-        return f"{head}."
-    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}."
+        return f"{head}.{_busy(result)}"
+    head += f"; {best.law.name} takes {effort} of the drive's limit and {_arrives(got.arrival)}.{_busy(result)}"
     if result.pd is None or result.stiff is None or result.pd.measured.figures is None:
         return head
     pd, stiff = result.pd.measured, result.stiff.measured.figures
@@ -76,6 +77,15 @@ def _verdict(result: Tracking) -> str:
         f"{percentage(pd.give / size, 0)} of the step, {best.law.name} by "
         f"{percentage(best.measured.give / size, 0)}; made as stiff, the PD {slow}."
     )
+
+
+def _busy(result: Tracking) -> str:
+    """Sets whose command is excessive at rest, as a sentence after others."""
+    busy = [(o.law.name, o.measured.rest) for o in result.sets if o.measured.rest and not o.measured.rest.quiet]
+    if not busy:
+        return ""
+    rms = ", ".join(f"{of_limit(rest.rms)} with {name}" for name, rest in busy)
+    return f" At rest the effort is excessive: the command's rms is {rms} ({100 * QUIET_RMS:.0f} % is quiet)."
 
 
 def _beyond(o: Outcome) -> str:
@@ -90,9 +100,9 @@ def _arrives(arrival: float) -> str:
 
 
 def _sound(result: Tracking) -> bool:
-    """Whether every set stays within the limits and settles."""
+    """Whether every set stays within the limits, settles, and is quiet at rest."""
     settled = all(o.measured.figures is not None and math.isfinite(o.measured.figures.settling_5) for o in result.sets)
-    return settled and all(o.within for o in result.sets)
+    return settled and all(o.within and o.quiet for o in result.sets)
 
 
 def _strongest(result: Tracking) -> Outcome:
@@ -347,6 +357,7 @@ def _numbers(result: Tracking) -> dict[str, Any]:
         names = ("change", "rise", "peak_time", "overshoot", "settling_2", "settling_5", "arrival", "error")
         return {
             **{n: None if f is None else getattr(f, n) for n in names},
+            "rest": None if r.rest is None else {"quiet": r.rest.quiet, "rms": r.rest.rms, "peak": r.rest.peak},
             "effort_peak": r.effort.peak, "effort_share": r.effort.share, "saturated": r.effort.saturated,
             "twist": r.twist, "travel": r.travel, "give": r.give, "tripped": r.tripped,
         }  # fmt: skip

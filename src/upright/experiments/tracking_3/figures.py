@@ -104,7 +104,7 @@ def _efforts(ax: Any, result: Tracking, outcomes: Sequence[Outcome], until: floa
 
 @styled
 def poles_figure(result: Tracking) -> Figure:
-    """Poles asked and attained, set by set; the upper half plane, which the lower mirrors."""
+    """Requested and attained poles, set by set; the upper half plane, which the lower mirrors."""
     laws, open_loop = [o.law for o in result.sets], result.model.linear(AT).poles()
     columns = min(2, len(laws))
     rows = -(-len(laws) // columns)

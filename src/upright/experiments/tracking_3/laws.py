@@ -52,8 +52,8 @@ class Tracker:
     law : Law
     poles : array
         Poles [1/s] of the sampled loop on the rig of the design, those that die within three samples left out.
-    asked : array
-        Poles asked for; empty for a PD.
+    requested : array
+        Requested poles; empty for a PD.
     stiffness : float
         Static force per error, k_pf times the drive's gain [N/m or N m/rad]: how hard it pulls at rest.
     play : float

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from upright.basis import SIMULATED
 from upright.control import Trial, trial
-from upright.control.effort import Effort, effort
+from upright.control.effort import Effort, RestEffort, effort, rest_effort, resting
 from upright.control.score import StepFigures, step_figures
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
@@ -64,6 +64,8 @@ class StepTrial:
         Of the far body; None where the rig trips or nothing moves.
     effort : Effort
         Of the step, up to the push.
+    rest : RestEffort or None
+        Of the last third of that, about what keeps the place; None where the run ended before.
     twist, travel : float
         Largest distance between the bodies, and from where they began, up to the push [m or rad].
     give : float
@@ -75,6 +77,7 @@ class StepTrial:
     trial: Trial
     figures: StepFigures | None
     effort: Effort
+    rest: RestEffort | None
     twist: float
     travel: float
     give: float
@@ -91,8 +94,13 @@ class Outcome:
 
     @property
     def tried(self) -> bool:
-        """Whether the rig was stepped with it; else what is measured is what is foreseen."""
+        """Whether the rig was stepped with it; else the measured figures are the predicted ones."""
         return self.measured is not self.predicted
+
+    @property
+    def quiet(self) -> bool:
+        """Whether the command is quiet once the step is done; a run that ended before says nothing of that."""
+        return self.measured.rest is None or self.measured.rest.quiet
 
     @property
     def within(self) -> bool:
@@ -164,7 +172,7 @@ class Tracking:
 
     @property
     def tried(self) -> bool:
-        """Whether anything was tried, beside what the model foresees."""
+        """Whether anything was tried, beside what the model predicts."""
         return any(o.tried for o in self.outcomes)
 
     @property
@@ -190,7 +198,7 @@ def run_tracking(
     folder : Path
         Takes logs, study and fit.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     stopped : callable, optional
         Asked between trials whether to stop there.
     which : sequence of int
@@ -236,7 +244,7 @@ def track_on(
     stopped: Callable[[], bool] = lambda: False, *, which: Sequence[int] = (1, 2, 3, 4),
     poles: NDArray[np.complex128] | None = None, step: float | None = None,
 ) -> Tracking:  # fmt: skip
-    """Design on the model and try on the rig; without a rig only what the model foresees is told. See `run_tracking`.
+    """Design on the model and try on the rig; without a rig only the prediction is reported. See `run_tracking`.
 
     Pole sets of Table 2 are for the makers' rigs; those of one's own are as much faster as the shaft swings faster.
 
@@ -302,12 +310,12 @@ def choose_step(model: Rig, laws: Sequence[Tracker], step: float | None = None) 
 
 
 def _times_as_fast(model: Rig) -> float:
-    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).plant)]
+    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).rig.plant)]
     return swings[0] / swings[1]
 
 
 def _tried(stand: TestStand, law: Tracker, expected: StepTrial, step: float, folder: Path) -> StepTrial | None:
-    """The law on the rig; None where it is foreseen to leave a live rig's bounds."""
+    """The law on the rig; None where it is predicted to leave a live rig's bounds."""
     safe = math.isinf(expected.tripped) and law.decay > 0 and not expected.effort.saturated
     if not stand.simulated and not safe:
         return None
@@ -345,6 +353,11 @@ def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
     )  # fmt: skip
 
 
+def _rest(t: Array, u: Array, limit: float) -> RestEffort:
+    """Command at rest about its mean, which a spring to ground may take to hold a place."""
+    return rest_effort(t, u - float(np.mean(resting(u))), limit)
+
+
 def figured(trial: Trial, step: float) -> StepTrial:
     """Figures of a trial, which may have ended before its time."""
     rig = trial.rig
@@ -367,6 +380,7 @@ def figured(trial: Trial, step: float) -> StepTrial:
             figures = None
     return StepTrial(
         trial=trial, figures=figures, effort=effort(trial.u[before : last + 1], rig.limit, rig.converter),
+        rest=None if ended else _rest(trial.t[before:at], trial.u[before:at], rig.limit),
         twist=float(apart[: last + 1].max()), travel=float(away[: last + 1].max()),
         give=math.inf if ended else float(abs(np.mean(y[-50:]) - np.mean(y[at - 50 : at]))), tripped=tripped,
     )  # fmt: skip

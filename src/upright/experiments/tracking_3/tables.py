@@ -56,7 +56,7 @@ def gain_table(result: Tracking) -> Table:
 
 
 def shaft_pole_table(result: Tracking) -> Table:
-    """Poles asked, and of the loop as it runs on the fitted rig."""
+    """Requested poles, and those of the loop as it runs on the fitted rig."""
     rows = [("open loop", "", written(result.model.linear(AT).poles(), 4))]
     rows += [
         (o.law.name, written(o.law.requested, 5) if o.law.requested.size else "–", written(o.law.poles, 4))
@@ -70,7 +70,7 @@ def shaft_pole_table(result: Tracking) -> Table:
 
 
 def step_table(result: Tracking) -> Table:
-    """Step figures, foreseen on the fitted model and found on the rig."""
+    """Step figures, predicted on the fitted model and measured on the rig."""
     rows: list[tuple[str, ...]] = []
     for o in tried_laws(result):
         both = (("foreseen", o.predicted), ("found", o.measured)) if result.tried else (("foreseen", o.predicted),)

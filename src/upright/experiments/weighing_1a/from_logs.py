@@ -1,4 +1,4 @@
-"""Experiment 1a on logs of a rig of one's own, or on those of a twin: what was added is told log by log."""
+"""Experiment 1a on logs of a rig of one's own, or on those of a twin: what was added is named log by log."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from upright.experiments.weighing_1a.run import drawn_twin, measure_body
 from upright.identification.loadings import Loadings
 from upright.records import Record
 from upright.report.page import Chapter, Step
-from upright.rig.makes import OSCILLATORS
+from upright.rig.makes import BODIES
 
 
 def weigh_logs(
@@ -37,7 +37,7 @@ def weigh_logs(
     Raises
     ------
     BadInput
-        When logs and loadings do not match, or a column is not told.
+        When logs and loadings do not match, or a column is not named.
     NotIdentifiable
         When too few swings can be seen.
     """
@@ -61,7 +61,7 @@ def weigh_logs(
         ),
         Step(
             "Plan the next loadings with the error of a frequency that these swings show.",
-            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
+            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {BODIES[kind].unit}"',
         ),
     ]
     page = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
@@ -71,8 +71,8 @@ def weigh_logs(
 
 def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Chapter]:
     """The same of a twin that is stepped here; its logs go into the folder, where one is named."""
-    if kind not in OSCILLATORS:
-        raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
+    if kind not in BODIES:
+        raise BadInput(f"--twin is {' or '.join(BODIES)}, got '{kind}'.")
     result = measure_body(drawn_twin(seed, kind))
     column = next(iter(result.logs.values())).outputs[0]
     result = result if folder is None else result.written(folder)

@@ -229,7 +229,7 @@ _REFUSED = (
     "GetNominalsOfContinuousStates", "GetNumberOfEventIndicators", "GetNumberOfContinuousStates", "EnterStepMode",
     "GetOutputDerivatives", "ActivateModelPartition",
 )  # fmt: skip
-"""What FMI 3.0 asks a library to have, and what this unit has nothing of: whoever calls them is told so."""
+"""What FMI 3.0 asks a library to have, and what this unit has nothing of: calls of them say so."""
 
 
 def _nothing(kind: str) -> str:

@@ -32,7 +32,7 @@ class Variable:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unit:
-    """A rig and the kernel that moves it; `told` is what the unit has otherwise than the fit, in sentences."""
+    """A rig and the kernel that moves it; `remarks` are the differences from the fit, in sentences."""
 
     rig: Rig
     simulator: Simulator

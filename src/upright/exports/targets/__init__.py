@@ -60,7 +60,7 @@ class RigExport:
     kept : callable
         The fit.json that it was read from; one that was only in memory is written into the folder.
     limit : float or None
-        Largest command that was asked for.
+        Requested limit of the command.
     """
 
     rig: Rig

@@ -5,7 +5,7 @@ measured state and the fitted model says where it should be half a swing later. 
 while the misfit of a free run lives on until the swing has died. A stretch that is missed far more than the other runs
 are is no fault of the model, since that errs alike in all.
 
-Both answers are told: what the numbers are without such a stretch, and what they would have been with it.
+Both answers are reported: what the numbers are without such a stretch, and what they would have been with it.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ Measured with it: no alarm on 138 clean swings of random pendulums, half of them
 """
 
 MOST = 99
-"""How many times more a stretch is missed is told up to here; beyond, what the others miss is next to nothing."""
+"""How many times more a stretch is missed is reported up to here; beyond, what the others miss is next to nothing."""
 
 STILL = 0.03
 """A stretch that varies by less than this share says nothing about how well motion is predicted."""
@@ -98,7 +98,7 @@ def outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run]) -> tuple[Outlier, ...]
     Parameters
     ----------
     fit : Fit
-        The model; `rig` is what it was asked about.
+        The model; `rig` is the requested one.
     runs : sequence of Run
         Those that were fitted and any others of the same rig. A run under a loop is only searched for spikes, since
         what its law remembers is not in the log; so is a predicted one with numbers of its own, since those are not in

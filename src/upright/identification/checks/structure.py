@@ -1,8 +1,8 @@
 """Which spring, offset, lean or drag, left out of the model, would explain runs that it does not explain?
 
-Every number that plant and drive may have and that the model leaves at nothing is asked for in turn. Accelerations,
+Every number that plant and drive may have and that the model leaves at nothing is tried in turn. Accelerations,
 which need no simulation, say which first: what pulls slowly hardly shows in them, yet it stands before all that is not
-there. The first ones are then fitted, and what they gain is told.
+there. The first ones are then fitted, and what they gain is reported.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ CLEAR = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """Numbers that the model leaves out, their values when they are asked for, and the least fit percent then."""
+    """Numbers that the model leaves out, their estimates, and the least fit percent then."""
 
     values: Mapping[str, float]
     reached: float

@@ -32,7 +32,7 @@ POOR = 9.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrequencyFit:
-    """Everything that follows from one response, measured `at` an equilibrium of a rig as it was known and asked.
+    """Everything that follows from one response, measured `at` an equilibrium of a rig as known and requested.
 
     `used` are the points of the `data` that were fitted, `left_out` says why the others were not. `fit` is for
     `fit.json`: estimates with covariance, poles at every equilibrium, verdict. `key` is the pole that a design has to
@@ -68,9 +68,9 @@ def explain(
     seed : int
         Of the starts of least squares.
     tell : callable, optional
-        Told the step at work and its share done.
+        Called with the current step and its share completed.
     stopped : callable
-        Asked between the fits.
+        Called between the fits: whether to stop.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def _key(by_equilibrium: Mapping[str, tuple[Pole, ...]], at: str) -> tuple[str, 
 
 
 def key_value(key: tuple[str, str, Pole]) -> Estimate:
-    """The number of the key pole that is told: its real part when it grows, its frequency when it swings."""
+    """The number of the key pole that is reported: its real part when it grows, its frequency when it swings."""
     return key[2].real if key[1] == "unstable pole" else key[2].imag
 
 
@@ -155,7 +155,7 @@ def _fit(
         low, high = value - q * s, value + q * s
         weak = high - low > abs(value) or Estimate.within(value, s, q * s).zero_wide
         bound = value < 1e-6 * rig.parameters[name].value
-        status = "at bound" if bound else "weak" if weak else "firm"
+        status = "at bound" if bound else "poorly determined" if weak else "well determined"
         estimates[name] = Estimate(value=value, stderr=s, interval=(max(low, 0.0), high), unit=unit, status=status)
     size = np.where(sigma > 0, sigma, 1.0)  # what the response does not depend on has no variance
     sentence, trusted = verdict(squares, key)

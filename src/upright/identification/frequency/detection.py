@@ -198,7 +198,7 @@ def settled(lines: Complex, *, tolerance: float = 2e-3, noise: Array | float = 0
 
 
 def sign_line(t: Array, y: Array, omega: float, guess: Array) -> complex | None:
-    """First line of the speed's sign, from where a signal without drift turns; None when that cannot be told.
+    """First line of the speed's sign, from where a signal without drift turns; None when that is not clear.
 
     Parameters
     ----------

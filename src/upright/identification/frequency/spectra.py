@@ -3,8 +3,8 @@
 Sines are detected synchronously; of a periodic command whole periods are averaged, and what differs between them is
 noise; anything else is cut into overlapping windows whose cross spectra are averaged (Welch), repeats together.
 
-Of a multisine phases are random, the best of many draws by crest factor. Only odd multiples of the base are asked, so
-that what dry friction and geometry add falls on lines of its own as well as on those asked.
+Of a multisine phases are random, the best of many draws by crest factor. Only odd multiples of the base are excited, so
+that what dry friction and geometry add falls on lines of its own as well as on those excited.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Complex = NDArray[np.complex128]
 SAME = 0.02
 """Relative difference of successive periods of one sine."""
 WEAK = 0.03
-"""Share of the command's largest amplitude spectrum below which a frequency was not asked."""
+"""Share of the command's largest amplitude spectrum below which a frequency was not excited."""
 DRAWS = 200
 """Sets of random phases from which a multisine is chosen."""
 MOST = 80
-"""Frequencies told at most from a sweep."""
+"""Frequencies taken at most from a sweep."""
 
 
 def response_of(
@@ -45,9 +45,9 @@ def response_of(
     records : sequence of Record
         Evenly sampled, but for gaps between sines.
     command, outputs : str and sequence of str
-        Columns, in the units in which the response is told.
+        Columns, in the units of the response.
     kind : {"", "sines", "multisine", "sweep"}
-        How the rig was asked; told from the command when empty.
+        Excitation; recognised from the command when empty.
     hold : float, optional
         Time for which the converter holds a command [s]; one sample when omitted.
     resolution : sequence of float
@@ -370,9 +370,9 @@ def _level(y: Array) -> Array:
 
 
 def _between(mean: Complex, lines: NDArray[np.int64]) -> Array:
-    """What stands on odd lines not asked, as root of its power near each line over the line's own size.
+    """What stands on odd lines not excited, as root of its power near each line over the line's own size.
 
-    Dry friction and geometry are odd: as much of them stands on the lines that were asked.
+    Dry friction and geometry are odd: as much of them stands on the lines that were excited.
     """
     others = np.arange(mean.shape[0]) % 2 == 1
     others[lines] = False

@@ -1,8 +1,9 @@
 """Assumed numbers: what rests on each, and what the data say without it.
 
 A log in volts and counts fixes inertia per gain, not inertia. Take the gain as 1 and say so
-(``gain = { value = "1 N m/V", assumed = true }``): what is proportional to it is told in volts, seconds and counts as
-well, and what does not feel it (frequencies, damping ratios, speeds) is firm.
+(``gain = { value = "1 N m/V", assumed = true }``): what is proportional to it is reported in volts, seconds and counts
+as well, and what does not feel it (frequencies, damping ratios, speeds) is known. A number without a source has a
+range: what rests on it is no better known than that, its ratio to it is.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,9 @@ Array = NDArray[np.float64]
 NEGLIGIBLE = 0.02
 """Percent per percent below which a number does not rest on an assumed one; a whole number is met as closely."""
 
+
+RANGE = 10.0
+"""A number that nobody measured may be so many times larger or smaller: drafts write its order of magnitude."""
 
 REDEFINES = {"J_p": ("l_cg",)}
 """Estimates that a number assumed to be zero gives another meaning: l_cg is the length of the simple pendulum then."""
@@ -55,14 +60,73 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
             Assumption(
                 name=p.name, value=p.value, unit=p.unit, follows=follows, size=size,
                 redefines=tuple(n for n in REDEFINES.get(p.name, ()) if p.value == 0 and n in follows),
-                without=_without(p, follows, estimates, problem),
+                without=_without(p, follows, estimates, problem), range=_range(p, size),
             )
         )  # fmt: skip
-    return tuple(out)
+    return tuple(replace(a, ratios=_ratios(a, out, estimates)) for a in out)
+
+
+def _range(p: Parameter, size: float) -> tuple[float, float]:
+    """Where an assumed number may lie: between the bounds it was given, or about as large as it stands there.
+
+    One assumed to be zero may be so large that it matters as much as any estimate does.
+    """
+    low, high = (-size, size) if p.value == 0 else sorted((p.value / RANGE, p.value * RANGE))
+    if p.value == 0 and p.unit in POSITIVE:
+        low = 0.0
+    return (p.lower if math.isfinite(p.lower) else low), (p.upper if math.isfinite(p.upper) else high)
+
+
+SMALL = 1e-12
+"""Share of an assumed number that stands for none of it."""
+
+POSITIVE = ("kg", "kg m^2", "m")
+"""Units of what is never negative."""
+
+
+def _factors(a: Assumption, name: str) -> tuple[float, float]:
+    """Least and largest factor on an estimate as an assumed number goes through its range, by the power it follows."""
+    power = a.follows.get(name, 0.0)
+    if math.isnan(power):  # not evaluated
+        return 1.0, 1.0
+    ends = [end / a.value if a.value else math.exp(end / a.size) if a.size else 1.0 for end in a.range]
+    factors = sorted(max(end, SMALL) ** power for end in ends)
+    return min(1.0, factors[0]), max(1.0, factors[-1])
+
+
+def _over_ranges(interval: tuple[float, float], name: str, found: Sequence[Assumption]) -> tuple[float, float]:
+    """An interval that holds what the ranges of all the assumed numbers in `found` make of it."""
+    for a in found:
+        ends = [end * factor if end else 0.0 for end, factor in product(interval, _factors(a, name))]
+        interval = min(ends), max(ends)
+    return interval
+
+
+def _ratios(a: Assumption, found: Sequence[Assumption], estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+    """Estimates that are proportional to an assumed number, per it; they hold what the other assumed ones may be."""
+    others = [b for b in found if b.name != a.name]
+    out: dict[str, Estimate] = {}
+    for n in proportional(a):
+        e = a.without.get(n, estimates[n])
+        scale = 1.0 if n in a.without else 1 / a.value
+        rest = [b for b in others if n in resting(b)]
+        low, high = _over_ranges(e.interval, n, rest)
+        out[f"{n}/{a.name.removeprefix('actuator.')}"] = replace(
+            e, value=e.value * scale, stderr=e.stderr * abs(scale), interval=(low * scale, high * scale),
+            unit=e.unit if n in a.without else _per(e.unit, a.unit), rests_on=tuple(b.name for b in rest),
+            status=_resting(e, [b.name for b in rest]),
+        )  # fmt: skip
+    return out
+
+
+def _per(above: str, below: str) -> str:
+    if below in ("", "1"):
+        return above
+    return f"{above} per {below}"
 
 
 def _moves(best: Optimum, assumed: Sequence[Parameter], places: Sequence[int]) -> tuple[Array | None, Array]:
-    """Relative change (asked, assumed) of each estimate per relative change of an assumed number, and their sizes."""
+    """Relative change (estimated, assumed) of each estimate per relative change of an assumed number, and sizes."""
     problem, x, value = best.problem, best.x, best.values
     names = {p.name for p in assumed}
     loose = {
@@ -107,28 +171,42 @@ def resting(a: Assumption) -> list[str]:
     return [n for n in a.follows if n not in free]
 
 
-def with_assumptions(estimates: Mapping[str, Estimate], rested: Sequence[Assumption]) -> dict[str, Estimate]:
-    """The estimates, each with the assumed numbers that it rests on."""
-    return {
-        n: replace(e, rests_on=tuple(a.name for a in rested if n in resting(a))) for n, e in estimates.items()
-    }  # fmt: skip
+def with_assumptions(estimates: Mapping[str, Estimate], found: Sequence[Assumption]) -> dict[str, Estimate]:
+    """The estimates, each with the assumed numbers that it rests on, as wide as their ranges make it."""
+    out: dict[str, Estimate] = {}
+    for n, e in estimates.items():
+        rests = [a for a in found if n in resting(a)]
+        out[n] = e
+        if rests:
+            names = tuple(a.name for a in rests)
+            status = _resting(e, names)
+            wide = _over_ranges(e.interval, n, rests)
+            out[n] = replace(e, rests_on=names, status=status, given=e.interval, interval=wide)
+    return out
+
+
+def _resting(e: Estimate, names: Sequence[str]) -> str:
+    return f"rests on {', '.join(names)}" if names and e.status == "well determined" else e.status
 
 
 def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
     """What rests on which assumed number, and what would make it known."""
-    sentences: list[str] = []
+    said: list[str] = []
     for a in rested:
-        along, firm, moved = proportional(a), untouched(a), resting(a)
+        along, free, moved = proportional(a), untouched(a), resting(a)
         unit = "" if a.unit in ("", "1") else f" {a.unit}"
-        parts = [f"{a.name} = {a.value:g}{unit} is assumed, not known"]
+        low, high = a.range
+        within = (
+            f", anything from {low:.2g} to {high:.2g}" if moved and math.isfinite(high - low) and low < high else ""
+        )
+        parts = [f"{a.name} = {a.value:g}{unit} is assumed, not known{within}"]
         if any(math.isnan(e) for e in a.follows.values()):
             parts.append("what rests on it was not evaluated, so every estimate may")
         else:
             other = {n: e for n, e in a.follows.items() if n in moved and n not in along}
             if along:
-                parts.append(
-                    f"{', '.join(along)} {'is' if len(along) == 1 else 'are'} proportional to it, ratios are firm"
-                )
+                verb = "is" if len(along) == 1 else "are"
+                parts.append(f"{', '.join(along)} {verb} proportional to it, so their ratios are known")
             if other and a.value != 0:
                 shifts = ", ".join(f"{n} by {e:+.2g} %" for n, e in other.items())
                 parts.append(f"for every percent of it {shifts} would follow")
@@ -136,10 +214,10 @@ def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
                 parts.append(f"{', '.join(other)} would move with it")
             if a.redefines:
                 parts.append(f"{', '.join(a.redefines)} takes what it would explain into its own value")
-            if firm:
-                parts.append(f"{', '.join(firm)} {'does' if len(firm) == 1 else 'do'} not depend on it")
-        sentences.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
-    return tuple(sentences)
+            if free:
+                parts.append(f"{', '.join(free)} {'does' if len(free) == 1 else 'do'} not depend on it")
+        said.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
+    return tuple(said)
 
 
 def remedy(a: Assumption) -> str:
@@ -153,7 +231,7 @@ def remedy(a: Assumption) -> str:
 def _without(
     assumed: Parameter, follows: Mapping[str, float], estimates: Mapping[str, Estimate], problem: Problem
 ) -> dict[str, Estimate]:
-    """Estimates per assumed gain, in units of the command, seconds, and counts where every encoder has one quantum."""
+    """Estimates per assumed gain, in units of the command, seconds, and counts if all encoders have one resolution."""
     if assumed.name != "actuator.gain":
         return {}
     force, _, command = assumed.unit.partition("/")

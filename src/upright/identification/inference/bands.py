@@ -6,7 +6,7 @@ the run tells of its own first state taken off, beside what the fit leaves over 
 residuals' memory and by how far they move when one block of the runs is left out (a jackknife in Gauss-Newton steps).
 Both matrices keep a combination that is seen well as sure as it is, which intervals widened one by one do not.
 
-How many such widths are needed is asked of data that a fit did not see (conformal prediction: Vovk, Gammerman and
+How many such widths are needed is calibrated on data that a fit did not use (conformal prediction: Vovk, Gammerman and
 Shafer 2005): each block is predicted from the fit of the others, and the quantile is that of what is missed, in widths.
 Whole blocks, since neighbouring samples err together (Chernozhukov, Wuethrich and Zhu 2018). Blocks lie between others
 of the same motion, and a new run does not, so no quantile is less than that of normal errors. How often bands hold runs

@@ -2,7 +2,7 @@
 
 ``y[k] = c + sum_i A_i y[k - i] + B_i w[k - i]`` (ARX) with `w` the means over each step of the commands and of
 held coordinates. It is fitted by least squares one step ahead; of several orders that one is taken which
-predicts the fitted runs best over the horizon asked. A model with physics that cannot beat it has missed something.
+predicts the fitted runs best over the requested horizon. A model with physics that cannot beat it has missed something.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A filter knows the state to within the covariance P that the sensors' resolution
 (Kalman 1960). Over h seconds the linear model makes ``Phi(h) P Phi(h)'`` of that, and a reading adds its own variance
 R, so even a model without an error misses by the root of ``C Phi(h) P Phi(h)' C' + R``; of one unstable mode this grows
 as exp(a h). What is missed beyond is the model's. A fit is judged as far ahead as this leaves it at least half of
-what may be missed: nearer hardly anything is told, and further every model fails for the want of a better encoder.
+what may be missed: nearer hardly anything is tested, and further every model fails for the want of a better encoder.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def ceilings(problem: Problem, index: int, x: Array, samples: Sequence[int]) -> 
 def judged(problem: Problem, x: Array) -> Judged | None:
     """How far ahead the runs that a filter predicts are judged; None where there is none.
 
-    The longest horizon, no longer than the one asked, at which every signal of every run may reach `ENOUGH`; one sample
-    where none is.
+    The longest horizon, no longer than the requested one, at which every signal of every run may reach `ENOUGH`; one
+    sample where none is.
     """
     seconds, growth = np.inf, 0.0
     for index, track in enumerate(problem.tracks):

@@ -10,8 +10,8 @@ one Gauss-Newton step). What the estimates then scatter beyond the sandwich is a
 random effects (DerSimonian and Laird 1986), and the truth counts as one more block: on rigs with physics that their
 models lack 93 % of the 95 % intervals held the truth, 83 % without (`python -m benchmarks misfit`).
 
-Combinations of numbers that change no output are told with the one number that would fix each: a free swing without a
-known force or inertia sees only ratios, since masses, forces and frictions scale together.
+Combinations of numbers that change no output are reported with the one number that would fix each: a free swing without
+a known force or inertia sees only ratios, since masses, forces and frictions scale together.
 """
 
 from __future__ import annotations

@@ -36,6 +36,9 @@ and the refits beside the estimate stall, as on the staircase that what sticks m
 AFFORDED = 2.0e7
 """Residuals that the profiles of one fit may cost altogether."""
 
+WIDE = 0.5
+"""How far an interval may reach from a number that is well determined, relative to it."""
+
 ALREADY = 0.9
 """A number is unseen when the data narrow what was known beforehand to no less than this share of it."""
 
@@ -52,19 +55,20 @@ def shared_estimates(
     for i in best.shared:
         u, plain = best.problem.unknowns[i], beside_bound(best, i)
         if u.name in hidden or (u.estimated and not best.pinned[i] and plain.zero_wide):
-            estimates[u.name] = _unseen(plain)
+            estimates[u.name] = replace(plain, status="nuisance") if u.name.startswith(NOISE) else _unseen(plain)
             continue
-        firm = "weak" if best.explains_nothing else "firm"
+        firm = "poorly determined" if best.explains_nothing else "well determined"
         status = firm if u.estimated else "known"
         interval = plain.interval
-        wide = interval[1] - interval[0] > abs(plain.value)
+        wide = plain.half > WIDE
         near = best.pinned[i] or interval[0] <= u.lower < plain.value or interval[1] >= u.upper > plain.value
         if u.estimated and (wide or near) and not u.name.startswith(NOISE):  # of a level its size is enough
             if profile_work(best) < budget:
                 budget -= profile_work(best)
                 interval = profile(best, i, plain, best.quantile, log)
-                wide = interval[1] - interval[0] > abs(plain.value)
-            status = "at bound" if best.pinned[i] else "weak" if wide else firm
+                wide = replace(plain, interval=interval).half > WIDE
+            status = "at bound" if best.pinned[i] else "poorly determined" if wide else firm
+        status = "nuisance" if u.name.startswith(NOISE) else status
         estimates[u.name] = replace(plain, interval=_within(u, interval), status=status)
     return estimates
 
@@ -79,7 +83,9 @@ def run_estimates(best: Optimum) -> tuple[dict[str, dict[str, Estimate]], dict[s
             continue
         e = estimate(best, i)
         size = abs(e.value) if u.log else u.scale
-        status = "weak" if best.explains_nothing or e.interval[1] - e.interval[0] > size else "firm"
+        status = (
+            "poorly determined" if best.explains_nothing or e.interval[1] - e.interval[0] > size else "well determined"
+        )
         narrowed = not u.log or u.prior is None or float(best.sigma[i]) <= ALREADY * u.prior[1]
         if best.pinned[i]:
             status = "at bound"
@@ -311,7 +317,7 @@ def with_left_out(best: Optimum, requested: GreyBox, left_out: Sequence[str], lo
 
 
 def widened(e: Estimate, interval: tuple[float, float]) -> Estimate:
-    """An estimate whose interval holds another one too; weak when it is then wider than the value."""
-    low, high = min(e.interval[0], interval[0]), max(e.interval[1], interval[1])
-    wide = e.status == "firm" and high - low > abs(e.value)
-    return replace(e, interval=(low, high), status="weak" if wide else e.status)
+    """An estimate whose interval holds another one too; poorly determined when it then reaches too far."""
+    whole = replace(e, interval=(min(e.interval[0], interval[0]), max(e.interval[1], interval[1])))
+    wide = e.status == "well determined" and whole.half > WIDE
+    return replace(whole, status="poorly determined" if wide else e.status)

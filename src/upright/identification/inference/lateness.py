@@ -1,4 +1,4 @@
-"""Does a drive act later than its command says? What a dead time that nobody asked for would explain."""
+"""Does a drive act later than its command says? What a dead time outside the model would explain."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class Lateness:
 
 
 def lateness(best: Optimum) -> Lateness | None:
-    """The dead time that nobody asked for.
+    """A dead time outside the model.
 
-    None where the drive's dead time or lag is asked or known already, or nothing is driven.
+    None where the drive's dead time or lag is estimated or known already, or nothing is driven.
     """
     problem, x = best.problem, best.x
     rig = problem.rig

@@ -41,7 +41,7 @@ def poles(
     """Poles [1/s] at each equilibrium, the fastest growing first, friction viscous only and back-EMF included.
 
     First-order propagation (delta method) of the covariance of the numbers sought. Of a conjugate pair the one above
-    the real axis is told. Equilibria that the fitted plant does not have are left out.
+    the real axis is reported. Equilibria that the fitted plant does not have are left out.
 
     Parameters
     ----------

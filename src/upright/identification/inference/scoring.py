@@ -71,9 +71,9 @@ def score_run(problem: Problem, index: int, x: Array, seconds: float | None = No
 
 
 def _score_ahead(problem: Problem, index: int, x: Array, plan: FilterPlan, seconds: float) -> RunScore:
-    """Score of a run that a filter predicts: what was foreseen exactly so far ahead, restart by restart.
+    """Score of a run that a filter predicts: predicted exactly so far ahead, restart by restart.
 
-    Beside it stand the horizons that were asked for, each with what the start state allows.
+    Beside it stand the requested horizons, each with what the start state allows.
     """
     requested = problem.tracks[index]
     run, weight = requested.run, plan.weight[:, None, None]
@@ -140,7 +140,7 @@ def predict(
     bands : Bands, optional
         What the fit promises; that of a `Fit` when omitted. Without it no band is drawn.
     progress : callable, optional
-        Told the stage, its cost and its number of simulations, and the share done.
+        Called with the stage, its cost and number of simulations, and the share completed.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """The verdict in three answers: does the model predict, which of its numbers can be used, and is it enough for a loop?
 
-None is better than its reasons. What was not tested is said to be not tested.
+None is better than its reasons. What was not tested is reported as not tested.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from upright.basis import NOT_SUPPORTED, in_percent
-from upright.identification.inference.assumptions import proportional, resting
+from upright.identification.inference.assumptions import resting
 from upright.identification.inference.ceiling import ENOUGH, Judged
 from upright.identification.inference.loop import Standing
+from upright.identification.inference.ties import Tie
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.grey_box import GreyBox
 from upright.quantities import figures
@@ -56,7 +57,7 @@ class Evidence:
     filter predicts, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
-    more than they vary.
+    more than they vary, `ties` which pairs of numbers cannot be told apart.
     """
 
     rig: GreyBox
@@ -75,6 +76,7 @@ class Evidence:
     bent: Sequence[str] = ()
     lost: Sequence[str] = ()
     nothing: bool = False
+    ties: Sequence[Tie] = ()
 
 
 def judge(evidence: Evidence) -> tuple[Judgement, ...]:
@@ -213,8 +215,8 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
             question=USABLE, answer="no",
             headline="None of them: the fit failed, and they are only where its search stopped.",
         )  # fmt: skip
-    estimated = {n: e for n, e in evidence.estimates.items() if e.status in ("firm", "weak", "at bound", "unseen")}
-    firm = [n for n, e in estimated.items() if e.status == "firm"]
+    estimated = {n: e for n, e in evidence.estimates.items() if e.status not in IDLE}
+    sure = [n for n, e in estimated.items() if e.status.startswith(DETERMINED)]
     reasons: list[str] = list(evidence.unseen)
     no = bool(evidence.unseen)
     if estimated and evidence.nothing:
@@ -223,11 +225,11 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
             "The model misses the fitted runs by more than these vary, so none of its numbers is determined, however "
             "narrow its interval."
         )
-    elif estimated and not firm and not evidence.unseen:
+    elif estimated and not sure and not evidence.unseen:
         no = True
         reasons.append("No number asked is determined well, so others would explain the runs as well.")
     for n, e in estimated.items():
-        low, high = e.interval
+        low, high = e.given or e.interval
         limit = evidence.rig.bounds(n) if n in evidence.rig.parameters else (-math.inf, math.inf)
         if _vanished(evidence.rig, n, e):
             no = True
@@ -246,7 +248,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
             reasons.append(
                 f"{n} reached its lower limit, 0: these data give no evidence for it (at most {_shown(high, e)})."
             )
-        elif e.status == "weak" and low > 0 and high > VAGUE * low:
+        elif e.status == "poorly determined" and low > 0 and high > VAGUE * low:
             no = no or n.startswith(ESSENTIAL)
             reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
         elif e.status == "unseen" and not any(n in sentence for sentence in evidence.unseen):
@@ -255,8 +257,10 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
                 f"{n} has no interval: its standard error came out as zero, as where a motion depends on it without "
                 "bound. Start nearer to the truth, or fit a shorter window."
             )
-        elif e.status == "weak" and not evidence.nothing:
+        elif e.status == "poorly determined" and not evidence.nothing:
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
+    open_ = {n for n, e in estimated.items() if not e.status.startswith("well") and not e.status.startswith("rests")}
+    reasons += [tie.sentence for tie in evidence.ties if {tie.first, tie.second} & open_]
     for a in evidence.assumptions:
         moved = resting(a)
         if moved:
@@ -275,25 +279,65 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
             "better; ask for its delay."
         )
     moving = {n: a for a in evidence.assumptions for n in resting(a)}
-    free = [n for n in firm if n not in moving and n not in evidence.bent]
+    free = [n for n in sure if n not in moving and n not in evidence.bent and estimated[n].status == "well determined"]
+    widest = max((estimated[n].half for n in free), default=math.inf)
+    narrow = f" {'Each' if free[1:] else 'It'} is known to {_share(widest)} or better." if widest < 1 else ""
+    known = f"{', '.join(free)}.{narrow}"
+    ratios = _ratios(evidence)
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
-        answer, headline = "in part", "As numbers of a plant that was guessed."
+        answer, headline = "in part", f"As numbers of a plant that was guessed.{_and(ratios)}"
     elif evidence.bent and not free:
         answer, headline = "no", "None of them before the drive's delay is asked for."
     elif reasons:
-        answer, headline = "in part", f"These numbers can be used: {', '.join(free)}."
+        answer, headline = "in part", f"These numbers can be used: {known}{_and(ratios)}"
         if not free:
-            scaled = {n for a in evidence.assumptions for n in proportional(a)} >= set(firm)
-            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in firm))
-            headline = "Only their ratios." if scaled or not missing else f"None of them before {missing} is measured."
+            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in sure))
+            headline = f"None of them before {missing} is measured.{_and(ratios)}"
+            if not missing:
+                headline = "None alone, only their sums."
     else:
-        answer, headline = "yes", f"All numbers can be used: {', '.join(firm)}." if firm else "Nothing was asked."
+        answer, headline = "yes", f"All numbers can be used: {known}" if sure else "Nothing was asked."
     advice = ""
-    if any(e.status in ("weak", "unseen") for e in estimated.values()):
+    if any(e.status in ("poorly determined", "unseen") for e in estimated.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
     return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+
+
+IDLE = ("known", "assumed", "left out", "nuisance")
+"""Statuses of numbers that nobody asked, or that only describe the noise."""
+
+DETERMINED = ("well determined", "rests on", "tied to")
+"""Beginnings of the statuses of numbers that the data determine: alone, per an assumed number, or with another."""
+
+
+def _ratios(found: Evidence) -> dict[str, Estimate]:
+    """What is known per assumed number, of numbers that the data determine."""
+    return {
+        name: e for a in found.assumptions for name, e in a.ratios.items()
+        if e.status.startswith(DETERMINED) and e.half < 1
+    }  # fmt: skip
+
+
+def _and(ratios: Mapping[str, Estimate]) -> str:
+    """A sentence of the ratios that are known, each with its interval."""
+    if not ratios:
+        return ""
+    return f" Known per assumed number: {'; '.join(f'{n} = {_with_interval(e)}' for n, e in ratios.items())}."
+
+
+def _with_interval(e: Estimate) -> str:
+    digits = figures(e.value, e.half * abs(e.value) / 2)
+    value, low, high = (f"{v:.{digits}g}" for v in (e.value, *e.interval))
+    return f"{value} ({low} to {high}) {e.unit}".removesuffix(" 1").rstrip()
+
+
+def _share(half: float) -> str:
+    """Half an interval relative to its value, rounded up to two figures."""
+    percent = 100 * half
+    step = 10.0 ** (math.floor(math.log10(percent)) - 1) if percent > 0 else 1.0
+    return f"{math.ceil(percent / step - 1e-9) * step:.2g} %"
 
 
 def _vanished(rig: GreyBox, name: str, e: Estimate) -> bool:

@@ -35,8 +35,8 @@ class CrossValidation:
     """Every run as fitted among all, and as predicted by a fit of the others, by its label.
 
     `values` are the parameters of the fit without the run, `blind` those that the others could not see: they keep what
-    the run itself said, so that its prediction is none of theirs. Runs that an interrupted search did not come to are
-    missing but for `fitted`. `bands` are those of the fit of all runs, as wide as these predictions ask.
+    the run itself specified, so that its prediction is none of theirs. Runs that an interrupted search did not come to
+    are missing but for `fitted`. `bands` are those of the fit of all runs, as wide as these predictions ask.
     """
 
     fitted: Mapping[str, RunScore]

@@ -144,7 +144,7 @@ def climb(
     Raises
     ------
     BadInput
-        When nothing can be held out, or a rung names what was not asked.
+        When nothing can be held out, or a rung names what was not to be estimated.
     """
     fitted = [run for run in runs if run.role == "fit"]
     rungs = list(rungs) if rungs else default_rungs(rig, fitted)
@@ -358,7 +358,7 @@ def choose_friction(rig: GreyBox, runs: Sequence[Run], log: SearchLog) -> tuple[
 
 
 def _note_rival(tried: Sequence[Candidate], left_out: Sequence[str], log: SearchLog) -> None:
-    """Note what a richer model would have said otherwise, where it explains the runs better.
+    """Note where a richer model differs, where it explains the runs better.
 
     That what is left out is predicted worse then means that something else is missing, not that the richer model is
     wrong. The chosen model comes first.

@@ -1,4 +1,4 @@
-"""Rungs: models nested in the one that was asked for, poorest first.
+"""Rungs: models nested in the requested one, poorest first.
 
 A rung adds terms to what the rungs below estimate; below it a term is held where it does nothing.
 """
@@ -103,7 +103,7 @@ def _present(rig: GreyBox, name: str) -> bool:
 
 
 def check_rungs(rig: GreyBox, rungs: Sequence[Rung]) -> None:
-    """Refuse rungs that add what nobody asked for, or the same term twice.
+    """Refuse rungs that add what was not requested, or the same term twice.
 
     Raises
     ------

@@ -23,25 +23,34 @@ EXACT = 1e-12
 class Estimate:
     """What the data say about one number.
 
-    `status` is "firm", "weak" (interval wider than the value, two models differ, or the model explains less than
-    nothing), "unseen" (the data cannot tell), "at bound", "known" or "assumed". `rests_on` names assumed numbers that
-    it would move with: until they are measured it is a number of them, whatever its interval.
+    `status` is "well determined" (to half its value or better, `half` says how well), "poorly determined" (wider, two
+    models differ, or the model explains less than nothing), "tied to b_2c" (known only together with that), "rests on
+    m_p", "unseen" (the data cannot tell), "at bound", "nuisance" (a level of noise), "known", "assumed" or "left out".
+    `rests_on` names assumed numbers that it would move with: its interval holds what their ranges make of it, and
+    `given` is the interval it would have if they were right.
     """
 
     value: float
     stderr: float
     interval: tuple[float, float]
     unit: str = ""
-    status: str = "firm"
+    status: str = "well determined"
     rests_on: tuple[str, ...] = ()
+    given: tuple[float, float] | None = None
 
     @property
     def qualified(self) -> str:
-        """Status, and which assumed numbers it is a number of; only beside those may it be firm."""
-        if not self.rests_on:
+        """Status, and which assumed numbers it is a number of; whatever rests on one is never well determined."""
+        rests = f"rests on {', '.join(self.rests_on)}"
+        if not self.rests_on or self.status.startswith("rests on"):
             return self.status
-        rests = f"rests on {', '.join(self.rests_on)} (assumed)"
-        return rests if self.status == "firm" else f"{self.status}, {rests}"
+        return rests if self.status == "well determined" else f"{self.status}, {rests}"
+
+    @property
+    def half(self) -> float:
+        """How far the farther end of its interval lies from its value, relative to that."""
+        low, high = self.interval
+        return max(high - self.value, self.value - low) / abs(self.value) if self.value else math.inf
 
     @property
     def zero_wide(self) -> bool:
@@ -71,6 +80,8 @@ class Assumption:
     evaluated, `without` the estimates proportional to it, per unit of the command and of the encoders. The size is its
     absolute value; of one assumed to be zero, what changes the runs as much as the most influential estimate does.
     `redefines` names estimates that it gives another meaning, under which they hold whatever its true value is.
+    Nobody measured it, so it may lie anywhere in its `range`. `ratios` are the powers of it that estimates are
+    proportional to, each estimate per such a power, by what it is called: ``b_2/m_p``.
     """
 
     name: str
@@ -80,6 +91,8 @@ class Assumption:
     without: Mapping[str, Estimate]
     size: float = 0.0
     redefines: tuple[str, ...] = ()
+    range: tuple[float, float] = (-math.inf, math.inf)
+    ratios: Mapping[str, Estimate] = field(default_factory=dict[str, Estimate])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,9 +37,9 @@ class Parameter:
 
 @dataclass(frozen=True, kw_only=True)
 class GreyBox:
-    """A plant with what is known and what is asked about its parameters and its actuator.
+    """A plant with the known and the estimated parameters of itself and its actuator.
 
-    The plant may be `guessed`: its columns suit it, and nobody said that it is this one.
+    The plant may be `guessed`: its columns suit it, and it was not specified.
     """
 
     plant: type[Plant]

@@ -25,7 +25,7 @@ class Normal:
 
     @classmethod
     def lost(cls, size: int) -> Normal:
-        """What is said of a point from where the model runs away: an infinite cost."""
+        """Cost of a point from where the model diverges: an infinite cost."""
         return cls(math.inf, np.zeros((size, size)), np.zeros(size))
 
     @classmethod
@@ -46,7 +46,7 @@ class Normal:
 
 
 def finite(values: Array) -> bool:
-    """Whether all values are finite, told by their sum: one pass without a temporary."""
+    """Whether all values are finite, tested by their sum: one pass without a temporary."""
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(values.sum()))
 

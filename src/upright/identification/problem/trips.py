@@ -1,4 +1,4 @@
-"""Runs whose drive went off, or came on, at another moment than logged: told, and guessed where it is asked."""
+"""Runs whose drive went off, or came on, at another moment than logged: reported, and guessed where it is estimated."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from upright.signals.trips import CLEAR, Terms, Trip, linear, trip_or_misfit
 def find_trips(rig: GreyBox, run: Run) -> list[Trip]:
     """A late begin and an early end of the first input's effect in one run, as far as its motion shows them.
 
-    Nothing is said of runs whose driven coordinate was not measured, or whose law is simulated.
+    Runs are left out whose driven coordinate was not measured, or whose law is simulated.
     """
     return _moments(rig, run)[0]
 
@@ -73,7 +73,7 @@ def trip_sentence(run: Run, trip: Trip) -> str:
 
 
 def with_trip_guesses(rig: GreyBox, run: Run) -> Run:
-    """The run with guesses of when its input really began and ended, for those of the two that are asked.
+    """The run with guesses of when its input really began and ended, for those of the two that are estimated.
 
     Where the motion plainly follows the command until its logged end, the guess is what the log says.
     """
@@ -88,7 +88,7 @@ def with_trip_guesses(rig: GreyBox, run: Run) -> Run:
 
 
 def unasked_trips(rig: GreyBox, runs: Sequence[Run]) -> list[str]:
-    """Sentences on drives that went off or came on where nobody asked when."""
+    """Sentences on drives that went off or came on where the moment is not estimated."""
     if any(n in rig.estimated for n in ("actuator.start", "actuator.end")):
         return []
     sentences: list[str] = []

@@ -39,7 +39,7 @@ class Unknown:
     `runs` are the places of the runs it belongs to, or `SHARED` for all, `group` the label of those that share it,
     empty for a number of one run or of all. Start and bounds are in SI; the coordinate in which it is sought is its
     logarithm if `log`. In that coordinate `scale` is a change that would matter and `prior` the mean and standard
-    deviation known beforehand. A known number with an uncertainty is sought but not `asked`.
+    deviation known beforehand. A known number with an uncertainty is fitted but not `estimated`.
     """
 
     name: str
@@ -121,8 +121,8 @@ def friction_names(rig: GreyBox) -> tuple[str, ...]:
 def matters(rig: GreyBox, coordinate: str, by: float = 1.0) -> bool:
     """Whether a coordinate's own value, not only its changes, is felt: by gravity, a spring or the mass matrix.
 
-    A constant error of the sensor cannot be told from the place where the run began otherwise. Of an angle that comes
-    round a change `by` one turn is not felt.
+    A constant error of the sensor cannot be separated from the place where the run began otherwise. Of an angle that
+    comes round a change `by` one turn is not felt.
     """
     from upright.physics.equations import evaluated
 
@@ -206,7 +206,7 @@ def run_unknowns(rig: GreyBox, index: int, run: Run, start: State) -> list[Unkno
 
 
 def _commanded(run: Run) -> NDArray[np.bool_]:
-    """Samples (N,) at which something is asked of the drive; by a loop, from the first change of its reference on."""
+    """Samples (N,) at which the drive is commanded; by a loop, from the first change of its reference on."""
     commanded = np.asarray(run.u.any(axis=1), dtype=bool)
     if run.loop is not None:
         r = run.loop.law.signal()[: run.t.size]

@@ -38,8 +38,8 @@ class SearchLog:
 
     `best` holds the problem last worked on and where in it the search stood, `lower` a problem, a lower cost of it met
     since and where, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the
-    rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; asked only when a fit is poor,
-    since no search mends a reversed sign.
+    rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; evaluated only when a fit is
+    poor, since no search mends a reversed sign.
     """
 
     progress: Progress = silent

@@ -1,1 +1,1 @@
-"""A fit, told: its chapter, tables and pictures, its equations, and what to do next."""
+"""Report of a fit: its chapter, tables and pictures, its equations, and what to do next."""

@@ -1,4 +1,4 @@
-"""A fit as a chapter: what was asked, how the runs are followed, which numbers came out and what they are worth."""
+"""A fit as a chapter: the question, how the runs are followed, which numbers came out and what they are worth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from upright.report.fit.figures import (
     fit_figure,
     interval_figure,
 )
-from upright.report.fit.tables import cross_table, parameter_table, pole_table, run_table, score_table, without_table
+from upright.report.fit.tables import cross_table, parameter_table, pole_table, ratio_table, run_table, score_table
 from upright.report.page import Block, Chapter, Facts, Formula, Part, Picture, Points, Step, Table
 from upright.report.symbols import percent, plain
 
@@ -103,7 +103,7 @@ def _verdict(fit: Fit) -> Iterator[Part]:
 
 
 def question(fit: Fit) -> str:
-    """The question that was asked, in a sentence."""
+    """The question of a fit, in a sentence."""
     fitted = sum(s.role == "fit" for s in fit.runs.values())
     predicted = len(fit.runs) - fitted
     runs = f"{fitted} run{'s' if fitted != 1 else ''}"
@@ -204,9 +204,9 @@ def _parameters(fit: Fit) -> list[Part]:
     parts = [
         Part(title="Parameters", key="parameters", content=(table if table.rows else "No parameter was estimated.",))
     ]
-    without, own, poles = without_table(fit), run_table(fit), pole_table(fit)
+    ratios, own, poles = ratio_table(fit), run_table(fit), pole_table(fit)
     if fit.assumptions:
-        content = (Points(tuple(assumption_sentences(fit.assumptions))), *((without,) if without.rows else ()))
+        content = (Points(tuple(assumption_sentences(fit.assumptions))), *((ratios,) if ratios.rows else ()))
         parts.append(Part(title="What rests on assumed numbers", key="assumed", content=content))
     if own.rows:
         parts.append(Part(title="Runs and groups", key="runs", content=(own,)))
@@ -249,8 +249,8 @@ def _unseen(fit: Fit) -> Part:
             Picture(
                 name="fit-intervals",
                 draw=lambda: interval_figure(fit.estimates),
-                caption="Interval of every estimate relative to its value. Solid with a disk: firm. Dashed with a "
-                "square: weak, unseen or at a bound; an arrow leaves the picture.",
+                caption="Interval of every estimate relative to its value. Solid with a disk: well determined. Dashed "
+                "with a square: anything else, such as poorly determined or at a bound; an arrow leaves the picture.",
                 description="The same intervals as in the table above.",
             )
         )
@@ -361,7 +361,7 @@ def _broken(fit: Fit) -> Iterator[Step]:
 
 def _blind(fit: Fit) -> Iterator[Step]:
     yield from map(Step, fit.unseen)
-    weak = [n for n, e in fit.estimates.items() if e.status in ("weak", "unseen")]
+    weak = [n for n, e in fit.estimates.items() if e.status in ("poorly determined", "unseen")]
     if weak and not fit.unseen:
         yield Step(
             f"The data hardly see {', '.join(weak)}: measure one of them on the bench and give it as known, or add a "
@@ -410,7 +410,7 @@ def _friction(fit: Fit, study: str, folder: str) -> Iterator[Step]:
         name: f"{term} of {joint.on} ({name})"
         for joint in fit.model.plant.joints
         for term, name in (("Coulomb friction", joint.coulomb), ("quadratic drag", joint.quadratic))
-        if name and name not in fit.model.estimated
+        if name and name not in fit.model.estimated and joint.on not in _prescribed(fit)
     }
     if coloured and fixed:
         others = " and others" if coloured[3:] else ""
@@ -420,3 +420,9 @@ def _friction(fit: Fit, study: str, folder: str) -> Iterator[Step]:
             "predicted better.",
             f'[parameters]\n{next(iter(fixed))} = {{ guess = "…", min = 0 }}\n\nupright ladder {study} -o {folder}',
         )
+
+
+def _prescribed(fit: Fit) -> set[str]:
+    """Coordinates whose motion every fitted run was given: whatever rubs there, these logs do not show it."""
+    fitted = [s for s in fit.runs.values() if s.role == "fit"]
+    return set[str]().union(*(s.measured for s in fitted)) - {n for s in fitted for n in s.fit_percent}

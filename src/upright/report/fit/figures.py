@@ -187,7 +187,7 @@ def _short(label: str, most: int = 26) -> str:
 def interval_figure(estimates: Mapping[str, Estimate], *, truth: Mapping[str, float] | None = None) -> Figure:
     """Every estimate's interval relative to its value, or to a twin's `truth`; what leaves the picture is an arrow.
 
-    Solid are estimates that are firm, or whose interval holds the truth.
+    Solid are estimates that are well determined, or whose interval holds the truth.
     """
     shown = {n: e for n, e in estimates.items() if e.status != "known" and e.value != 0}
     centres = {n: e.value for n, e in shown.items()} if truth is None else {n: truth[n] for n in shown if truth.get(n)}
@@ -198,7 +198,7 @@ def interval_figure(estimates: Mapping[str, Estimate], *, truth: Mapping[str, fl
     reach = min(_MOST, 1.25 * max(finite, default=0.1))
     for row, (name, (low, high)) in enumerate(ends.items()):
         e, centre = shown[name], centres[name]
-        firm = e.status == "firm" if truth is None else low <= 0 <= high
+        firm = e.status == "well determined" if truth is None else low <= 0 <= high
         colour = BLUE if firm else VERMILLION
         lo, hi = max(low, -reach), min(high, reach)
         ax.plot([100 * lo, 100 * hi], [row, row], color=colour, linewidth=2, linestyle="-" if firm else (0, (3, 1)))

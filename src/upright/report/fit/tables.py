@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+from upright.identification.inference.assumptions import resting
 from upright.identification.ladder.cross_validation import CrossValidation
-from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
+from upright.identification.model.fit import Assumption, Estimate, Fit, Pole, RunScore
 from upright.identification.model.grey_box import Parameter
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import figures
@@ -34,9 +35,10 @@ def parameter_table(
     caption : str
     """
     about = fit.model.parameters
+    ranges = {a.name: f"{number(a.range[0], 2)} to {number(a.range[1], 2)}" for a in fit.assumptions if _moves(a)}
     described = {n: _estimate(n, e, about.get(n)) for n, e in fit.estimates.items() if e.status != "known"}
     described |= {
-        n: (number(p.value), _sure(p), "", unit(p.unit), "assumed" if p.assumed else "given", _called(n, p))
+        n: (number(p.value), _sure(p), ranges.get(n, ""), unit(p.unit), _source(p), _called(n, p))
         for n, p in about.items()
         if not p.estimate
         and n not in described
@@ -53,6 +55,15 @@ def parameter_table(
     return Table(
         caption=caption, headings=headings, rows=tuple(rows), numbers=numbers, badge=headings.index("status")
     )  # fmt: skip
+
+
+def _moves(a: Assumption) -> bool:
+    """Whether an estimate rests on an assumed number, whose range then counts."""
+    return bool(resting(a)) and math.isfinite(a.range[1] - a.range[0])
+
+
+def _source(p: Parameter) -> str:
+    return "assumed" if p.assumed else "given"
 
 
 def _sure(p: Parameter) -> str:
@@ -74,15 +85,13 @@ def within(e: Estimate, true: float) -> bool:
     return e.interval[0] <= true <= e.interval[1]
 
 
-def without_table(fit: Fit) -> Table:
-    """What rests on assumed numbers, stated without them."""
-    about = fit.model.parameters
+def ratio_table(fit: Fit) -> Table:
+    """What the data tell of numbers that rest on assumed ones: their ratios to these."""
+    rows = [(n, e) for a in fit.assumptions for n, e in a.ratios.items()]
     return Table(
-        caption="What the data give without the assumed gain: per unit of the command, in seconds and counts",
-        headings=("symbol", *_ESTIMATE), numbers=(1, 2, 3), badge=5,
-        rows=tuple(
-            (Symbol(n), *_estimate(n, e, about.get(n))) for a in fit.assumptions for n, e in a.without.items()
-        ),
+        caption="What is known: per assumed number; per gain in units of the command, seconds and counts",
+        headings=("ratio", *_ESTIMATE[:-1]), numbers=(1, 2, 3), badge=5,
+        rows=tuple((plain(n), *_estimate(n, e, None)[:-1]) for n, e in rows),
     )  # fmt: skip
 
 
@@ -99,7 +108,14 @@ def run_table(fit: Fit) -> Table:
 
 def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
     beforehand = ", known beforehand" if about and about.uncertainty else ""
-    return (*with_error(e.value, e.stderr), interval(e), unit(e.unit), e.qualified, _called(name, about) + beforehand)
+    value, error = with_error(e.value, e.stderr)
+    error = f"{error} with it" if e.given and error else error  # the assumed number, were it right
+    return value, error, interval(e), unit(e.unit), f"{e.qualified}{_narrow(e)}", _called(name, about) + beforehand
+
+
+def _narrow(e: Estimate) -> str:
+    """How narrow a number is that is well determined: half its interval, in percent of it."""
+    return f" (±{100 * e.half:.2g} %)" if e.status == "well determined" and e.half < 1 else ""
 
 
 def _called(name: str, about: Parameter | None) -> str:
@@ -122,7 +138,7 @@ def plain_estimate(e: Estimate, true: float | None = None) -> dict[str, object]:
 
 def interval(e: Estimate) -> str:
     """95 % interval of an estimate, in as many figures as the estimate has."""
-    digits = figures(e.value, e.stderr)
+    digits = 2 if e.given else figures(e.value, e.stderr)
     return f"{number(e.interval[0], digits)} to {number(e.interval[1], digits)}"
 
 

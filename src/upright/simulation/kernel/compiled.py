@@ -66,7 +66,7 @@ def _version() -> str:
 
 
 class Kernel:
-    """Functions of one kernel's text, each compiled when it is first asked for."""
+    """Functions of one kernel's text, each compiled at first use."""
 
     def __init__(self, text: str, *, strict: bool = False) -> None:
         self.text, self._strict = text, strict

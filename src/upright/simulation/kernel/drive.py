@@ -1,4 +1,4 @@
-"""What does the drive do besides what it is told: trip, brake while it is powered, lose force at speed?
+"""What does the drive do besides its command: trip, brake while it is powered, lose force at speed?
 
 Text for one input of a kernel. ``u_eff = F_c(u, v) on(t) - slope v - B``, where the braking ``B = D(t) v`` may need a
 time to build up and to fade, ``relaxation B' + B = D(t) v``, as the current of a winding does. There ``on`` is 1
@@ -22,7 +22,7 @@ def nodes(f: Flavour) -> list[str]:
 
 
 def force(p: Layout) -> list[str]:
-    """Lines that turn the force a drive is asked for into the one it gives at the speed it has."""
+    """Lines that turn the requested force of a drive into the one it gives at the speed it has."""
     f, lines = p.flavour, list[str]()
     for j, u in enumerate(p.derived.inputs if f.dynamic else ()):
         v, lost = p.velocities[p.drives[j]], f"_sl{j}"

@@ -53,7 +53,7 @@ class Flavour:
     capped : bool
         What reaches the body has a limit.
     rising : bool
-        The drive brakes by how much is asked of it.
+        The drive brakes in proportion to its command.
     droop : bool
         The gain falls with the command.
     loop : Structure or Written, optional

@@ -131,7 +131,7 @@ def _clip(w: Writer, j: int, name: str) -> None:
 
 
 def _force_lines(w: Writer, j: int, name: str, command: str) -> list[str]:
-    """Lines for the force asked of input `j` by a command."""
+    """Lines for the requested force of input `j` by a command."""
     if not w.p.flavour.droop:
         return [f"{name} = {{gain{j}}} * ({command} + {{off{j}}})"]
     return [f"_z = {command} + {{off{j}}}", f"{name} = {{gain{j}}} * _z / (1.0 + {{gd{j}}} * abs(_z))"]

@@ -83,7 +83,7 @@ class Module:
         return mark(self._functions[name]) == "separate" and not self._together
 
     def instance(self, name: str, types: tuple[Type, ...]) -> tuple[str, Number | TupleOf | None]:
-        """Symbol of a function for these types of arguments, written when it is first asked for, and its result."""
+        """Symbol of a function for these types of arguments, written at first use, and its result."""
         key = name, types
         if key not in self._instances:
             flags, attribute = _MARKS[mark(self._functions[name])]
@@ -143,6 +143,6 @@ class Module:
         return self.whole(platform, f"define void @{name}({', '.join(named)}) {_WIDE} {{\n{call}}}\n")
 
     def whole(self, platform: Platform, last: str) -> str:
-        """The module with all that was asked for, and with what is called from outside at its end."""
+        """The module with all functions requested, and with what is called from outside at its end."""
         head = [f'target triple = "{platform.triple}"', f'target datalayout = "{platform.layout}"']
         return "\n".join([*head, *self.declared.values(), *self._written, last]) + "\n"

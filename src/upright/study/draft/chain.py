@@ -38,10 +38,10 @@ from upright.study.rig import per
 from upright.study.text import TomlTable
 
 REACH = 10.0
-"""Volts that ECP's converter can put out; its log shows what the program asked for."""
+"""Volts that ECP's converter can put out; its log shows what the program requested."""
 
 RESOLVED = 0.003
-"""Sample period [s] above which the braking of a drive, built up in some 30 ms, is not seen and not asked for."""
+"""Sample period [s] above which the braking of a drive, built up in some 30 ms, is neither seen nor estimated."""
 
 RESTS = 0.01
 """Share of its travel by which a body at rest may creep."""
@@ -53,7 +53,7 @@ LAGS = 0.95
 """Share of its neighbour's displacement above which dry friction may hold a body back as well as a spring."""
 
 PASSES = 0.1
-"""Share of its range that a converter's amplifier may pass when more is asked than the range; where a search begins."""
+"""Share of its range that a converter's amplifier may pass when a command exceeds the range; where a search begins."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -61,7 +61,7 @@ class ChainLog:
     reference : Column or None
         What a loop was to follow.
     loop : str
-        The law that made the command of reference and motion, as a study writes it; "" when it could not be told.
+        The law that made the command of reference and motion, as a study writes it; "" when it is not recovered.
     windows : tuple of (float, float)
         Stretches that speak about the plant [s].
     still : tuple of str

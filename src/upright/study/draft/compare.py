@@ -32,7 +32,7 @@ MIRRORED = 3
 
 DOUBTFUL, CLEAR = 0.1, 0.5
 """A plant that leaves more than the first is worse than one that leaves less than the second of it; two whose
-accelerations were smoothed over other spans are not told apart by less.
+accelerations were smoothed over other spans are not distinguished by less.
 """
 
 
@@ -65,7 +65,7 @@ def explained(record: Record, drafts: Mapping[str, str], log: str) -> dict[str, 
 
 
 def sprung(rig: GreyBox, sample: Sample) -> GreyBox:
-    """The rig with every spring asked that a draft leaves out until a log shows it; guesses swing as the log does."""
+    """The rig with every spring estimated that a draft leaves out until a log shows it; guesses swing like the log."""
     w = 2 * math.pi / sample.period
     held = {p.unit: p.value for p in rig.parameters.values() if p.unit in SPRUNG.values() and p.value}
     left_out = [p for p in rig.parameters.values() if p.unit in SPRUNG and not p.estimate and not p.value]

@@ -78,7 +78,7 @@ def window_of(tables: Sequence[TomlTable], record: Record) -> str:
 
 
 def alike(record: Record, inspection: Inspection, recognised: Recognised) -> list[str]:
-    """Sentence on the other plants that the columns could be of, and what each explains where it can be told.
+    """Sentence on the other plants that the columns could be of, and what each explains where it is known.
 
     Counts of an unknown encoder do not tell: a pendulum's angle has to be an angle. Carts from disks they never tell,
     and what was recognised says so already.

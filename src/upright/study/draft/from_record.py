@@ -1,4 +1,4 @@
-"""A study of a record at hand, with what its owner knows and asks in the place of what a draft guesses."""
+"""A study of a record: a draft, with the caller's known and estimated numbers in place of its guesses."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def _answer(
     values: dict[str, Any], actuator: dict[str, Any], plant: type[Plant], known: Mapping[str, Number],
     ask: Sequence[str] | Mapping[str, Number] | None,
 ) -> None:  # fmt: skip
-    """Put what is known and asked in the place of what the draft guessed."""
+    """Replace guesses of a draft by what is known and estimated."""
     names = (*plant.names(), *ACTUATOR)
     estimated = [] if ask is None else list(ask)
     for name in (*known, *estimated):

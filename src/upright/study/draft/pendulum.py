@@ -1,4 +1,4 @@
-"""Draft of a study of pendulums and of plants of the user's own: which numbers are assumed, which are asked.
+"""Draft of a study of pendulums and of plants of the user's own: which numbers are assumed, which are estimated.
 
 Nothing is known that nobody measured: a placeholder is assumed, so that the fit says what rests on it.
 
@@ -92,7 +92,7 @@ class Balanced:
 
 @dataclass(frozen=True, kw_only=True)
 class PendulumStarts:
-    """Numbers of a plant in SI: `assumed` with the reason, `asked` from a guess on, `uncertain` with how much [%]."""
+    """Numbers of a plant in SI: `assumed` with the reason, `guesses` to estimate, `uncertain` with how much [%]."""
 
     assumed: Mapping[str, tuple[float, str]]
     guesses: Mapping[str, float]

@@ -1,4 +1,4 @@
-"""What a log shows before anybody has said what the rig is: plant, columns, stretches, rest levels, period."""
+"""What a log shows without a description of the rig: plant, columns, stretches, rest levels, period."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Recognised:
 
 
 def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recognised:
-    """What can be told from a record and its inspection; `plant` overrides the guess.
+    """What is recognised in a record and its inspection; `plant` overrides the guess.
 
     Raises
     ------

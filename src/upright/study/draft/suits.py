@@ -1,4 +1,4 @@
-"""Which plants a log's columns could be of, before anybody has said what the rig is."""
+"""Which plants a log's columns could be of, without a description of the rig."""
 
 from __future__ import annotations
 

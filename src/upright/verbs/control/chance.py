@@ -1,4 +1,4 @@
-"""The chance that gains hold a rig, told before anything moves: `chance`."""
+"""Predicted probability that gains stabilise a rig: `chance`."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def chance(
     workers : int, str or executor
         Who simulates them, as in `regulate`.
     progress : callable, optional
-        Told how many are done.
+        Called with how many are completed.
     **on
         Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 

@@ -56,7 +56,7 @@ def design(
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
 
     The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
-    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is asked for; period, delay and
+    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is requested; period, delay and
     differenced encoders are then put in.
 
     Parameters
@@ -82,7 +82,7 @@ def design(
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool
-        Gains whose sampled loop has the poles asked.
+        Gains whose sampled loop has the requested poles.
     seed : int
         Of the rigs drawn from the fit's covariance.
     out : path, optional

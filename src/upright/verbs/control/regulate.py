@@ -86,7 +86,7 @@ def regulate(
         Who simulates those rigs: processes of this machine, the address of a Dask scheduler, or an executor of
         `concurrent.futures`; the numbers are the same.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **on
         Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 

@@ -79,7 +79,7 @@ def swing_up(
     Returns
     -------
     Answer
-        Of a `SwingUpRun`, which says whether it was `caught`; of the encoders' `Scales` when only they are asked.
+        Of a `SwingUpRun`, which says whether it was `caught`; of the encoders' `Scales` when only they are checked.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def track(
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **on
         Of the rig: limit, and of a rig of your own period, counts, vendor; see `RigOptions`.
 

@@ -19,7 +19,7 @@ from upright.verbs.pages import folder
     names={"single": "--float"},
     metavars={"source": "GAINS_OR_FIT", "to": "FORM"},
     helps={
-        "source": "design.json or fit.json, or its folder.",
+        "source": "design.json, swing_up.json or fit.json, or its folder.",
         "to": "A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu.",
         "single": "Single precision instead of double.",
     },
@@ -41,8 +41,9 @@ def export(
 
     Parameters
     ----------
-    source : path, answer of `design` or `identify`, Law, Rule or plant
-        Of a law design.json or its folder; of a rig what `identify` answered, fit.json or its folder, or a plant.
+    source : path, answer of `design`, `swing_up` or `identify`, Law, Rule or plant
+        Of a law design.json, swing_up.json or its folder; of a rig what `identify` answered, fit.json or its folder, or
+        a plant.
     to : str
         One of `upright.exports.targets.TARGETS`: of a law ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU
         Octave too) or ``"simulink"``; of a rig ``"gymnasium"``, an environment whose every episode has another rig

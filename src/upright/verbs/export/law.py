@@ -16,20 +16,24 @@ if TYPE_CHECKING:
     from upright.exports.controller import SampledController
     from upright.exports.targets import LawTarget
 
+FILES = ("design.json", "swing_up.json")
+"""Of a folder, the first that is there."""
+
 
 def controller_of(source: Any) -> tuple[SampledController, str]:
     """The law to be written, and what it is called by."""
-    from upright.exports.controller import of_design, of_law
+    from upright.exports.controller import of_law
     from upright.exports.targets import TARGETS, RigTarget
 
-    if isinstance(source, Answer) and "law" in (source.numbers or {}):
+    if isinstance(source, Answer) and {"law", "rule"} & (source.numbers or {}).keys():
         from upright.files import plain_values
 
-        return of_design(plain_values(source.numbers), "this design"), "this design"
+        return _of_content(plain_values(source.numbers), "this design")
     if not isinstance(source, str | os.PathLike):
         return of_law(source), "this law"
     path = Path(source)
-    path = path / "design.json" if path.is_dir() else path
+    if path.is_dir():
+        path = next((p for p in (path / name for name in FILES) if p.exists()), path / FILES[0])
     if not path.exists():
         raise BadInput(f"{path} does not exist; `upright design ... -o FOLDER` writes FOLDER/design.json.")
     try:
@@ -42,7 +46,15 @@ def controller_of(source: Any) -> tuple[SampledController, str]:
             f"{path} is a fit, and a law is what `upright design {path} --poles ... -o FOLDER` makes of it; the rig "
             f"itself goes --to {', '.join(forms)} or {last}."
         )
-    return of_design(content, str(path)), str(path)
+    return _of_content(content, str(path))
+
+
+def _of_content(content: Any, name: str) -> tuple[SampledController, str]:
+    """The law of a design, or of a swing-up, whose file holds a rule."""
+    from upright.exports.controller import of_design, of_swing_up
+
+    swings = isinstance(content, dict) and ("rule" in content or "swing_up" in content)
+    return (of_swing_up if swings else of_design)(content, name), name
 
 
 def write_law(made: SampledController, name: str, target: LawTarget, at: Path, single: bool) -> Answer[tuple[str, ...]]:

@@ -1,1 +1,1 @@
-"""Linear models as they are handed over, and what is asked of a loop around one."""
+"""Linear models as they are handed over, and design of a loop around one."""

@@ -1,4 +1,4 @@
-"""A loop around a linear model: gains by poles or by least cost, its model at the samples, prefilter and margins."""
+"""A loop around a linear model: gains by poles or by LQR, its model at the samples, prefilter and margins."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _read(model: Any, verb: str) -> StateSpace:
 
 @_model_first
 def place(model: Any, poles: Any) -> Gains:
-    """Gains that put the poles of a linear model where they are asked, by Ackermann's formula.
+    """Gains that put the poles of a linear model where requested, by Ackermann's formula.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def place(model: Any, poles: Any) -> Gains:
 
 @_model_first
 def lqr(model: Any, Q: Any, R: Any) -> Gains:
-    """Gains of least cost, the integral of ``x' Q x + u' R u``; ``K, S, E = lqr(...)`` as python-control gives it.
+    """LQR gains, which minimise the integral of ``x' Q x + u' R u``; ``K, S, E = lqr(...)`` as python-control gives it.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def lqr(model: Any, Q: Any, R: Any) -> Gains:
 
 @_model_first
 def dlqr(model: Any, Q: Any, R: Any) -> Gains:
-    """Gains of least cost of a sampled model, the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
+    """LQR gains of a sampled model, which minimise the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def hold(model: Any, period: Any, delay: float = 0.0, lag: float = 0.0, method: 
 
 @_model_first
 def observer(model: Any, poles: Any) -> Estimator:
-    """Observer of a sampled model whose error dies out with the poles asked.
+    """Observer of a sampled model whose error decays with the requested poles.
 
     Parameters
     ----------

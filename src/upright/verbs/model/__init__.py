@@ -1,1 +1,1 @@
-"""Models of a rig: identified, grown, asked what they predict."""
+"""Models of a rig: identified, grown, their predictions."""

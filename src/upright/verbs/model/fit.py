@@ -12,7 +12,7 @@ from upright.verbs.answer import Answer
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
-    from upright.identification import Fit, RunScore
+    from upright.identification import Estimate, Fit, RunScore
     from upright.identification.ladder.cross_validation import CrossValidation
     from upright.identification.model.bands import Bands
     from upright.physics import Plant
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class FitAnswer(Answer["Fit"]):
-    """A fit, with the study that asked for it.
+    """A fit, with its study.
 
     Attributes
     ----------
@@ -73,6 +73,11 @@ class FitAnswer(Answer["Fit"]):
         if name not in rig.parameters:
             raise BadInput(f"this fit has no parameter '{name}'; {nearest(name, [*estimates, *rig.parameters])}")
         return rig.parameters[name]
+
+    @property
+    def ratios(self) -> Mapping[str, Estimate]:
+        """What is known of numbers that rest on assumed ones, per these: ``fit.ratios["b_2/m_p"]``."""
+        return {n: e for a in self.value.assumptions for n, e in a.ratios.items()}
 
     @property
     def parameters(self) -> Any:

@@ -30,7 +30,7 @@ class ResponseOptions(TypedDict, total=False):
     Parameters
     ----------
     kind : str, optional
-        What a log holds of these, when it is not told rightly.
+        What a log holds of these, when it is not recognised rightly.
     command : str, optional
         Column that drives.
     signal : mapping of str to str, optional
@@ -95,7 +95,7 @@ def frequency(
     Parameters
     ----------
     sources : path or sequence of paths, optional
-        Logs (repeats together), a frequency.csv, or a study; a twin is asked when omitted.
+        Logs (repeats together), a frequency.csv, or a study; a twin when omitted.
     rig : str
         Twin, or make of the logged rig: furuta, linear, rectilinear, torsional.
     seed : int
@@ -109,7 +109,7 @@ def frequency(
     pdf : bool
         Write the page as PDF too.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **of_log
         Of the logs: kind, command, signal, counts, known, hold, low, high; see `ResponseOptions`.
 
@@ -170,7 +170,7 @@ def frequency(
 
 
 def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
-    """Least and greatest frequency [rad/s] of those that were said."""
+    """Least and greatest frequency [rad/s] of those specified."""
     for value, option in ((low, "--from"), (high, "--to")):
         if value is not None and not 0 < value < math.inf:
             raise BadInput(f"{option} needs a frequency above 0 rad/s, got {value:g}; leave it out to take all.")
@@ -202,7 +202,7 @@ def _known(name: str, value: float | str | tuple[float, float], make: str) -> tu
         return si(value, ""), 0.0
     from upright.units import measured
 
-    plant = MAKES[make].plant
+    plant = MAKES[make].rig.plant
     if name in plant.names():
         return measured(value, plant.quantity(name).unit)
     return measured(value, "s" if name in ("actuator.delay", "actuator.lag") else "")

@@ -146,7 +146,7 @@ def identify(
         Who computes the refits of ``hold_out="each"``: processes of this machine, the address of a Dask scheduler, or
         an executor of `concurrent.futures`.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
     **of_log
         For a log: ask, columns, units, window; see `LogOptions`.
 

@@ -80,7 +80,7 @@ def ladder(
         Who predicts each run from a fit of the others: processes of this machine, the address of a Dask scheduler, or
         an executor of `concurrent.futures`.
     progress : callable, optional
-        Told the step at work and the share done.
+        Called with the current step and the share completed.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def ladder(
     Raises
     ------
     BadInput
-        When the study or a log is wrong, or nothing is asked.
+        When the study or a log is wrong, or nothing is to be estimated.
     KeyboardInterrupt
         When Ctrl-C came before the first rung stood.
     """
