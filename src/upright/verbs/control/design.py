@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -13,6 +14,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.control.play import live_page, live_part
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
 from upright.verbs.options import DesignOptions, above_zero, as_typed, known_options, rig_entries
@@ -21,6 +23,7 @@ from upright.verbs.values import Start, read_pole_list, read_start, si_if_given
 
 if TYPE_CHECKING:
     from upright.designing.run import Designed
+    from upright.report.page import Part
     from upright.rig import Rig
     from upright.systems import StateSpace
 
@@ -149,9 +152,14 @@ def design(
     page = chapter(designed, source=name + as_typed(on), folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
+        moves: tuple[Part, ...] = ()
+        if (on_rig := request.on) is not None and request.at == "inverted" and request.speed != "kalman":
+            how = {"seed": seed, "speed": request.speed, "memory": request.memory}
+            page_of: Any = partial(live_page, on_rig, on_rig, designed.continuous, **how)
+            moves = live_part(on_rig.name, lambda: page_of()[0])
         files = [
             write_json(folder_at / "design.json", page.numbers),
-            *write_page(page, folder_at / "design.html", pdf),
+            *write_page(replace(page, parts=(*page.parts, *moves)), folder_at / "design.html", pdf),
         ]
     return Answer(designed, page, files)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from upright.errors import BadInput
+from upright.errors import BadInput, UprightError
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
@@ -19,6 +19,7 @@ from upright.verbs.values import Start, read_start
 if TYPE_CHECKING:
     from upright.control.score import Scores
     from upright.records import Array
+    from upright.report.page import Chapter, Part
     from upright.rig import Rig
 
 _DESIGN = ("limit", "period", "counts", "vendor", "memory")
@@ -27,7 +28,8 @@ _DESIGN = ("limit", "period", "counts", "vendor", "memory")
 @command(
     "Control",
     metavars={"fit": "FIT", "poles": "LIST", "start": "LIST", "out": "PAGE"},
-    helps={"fit": "fit.json, its folder, or a study (TOML)."},
+    helps={"fit": "fit.json, its folder, or a study (TOML).", "out": "The page."},
+    defaults={"out": "play.html"},
     more="""
     upright play out/fit.json -o play.html
     upright play out/fit.json --poles "-4.15+-1.63j, -16.9, -3.2" --limit "5 V"
@@ -36,9 +38,9 @@ _DESIGN = ("limit", "period", "counts", "vendor", "memory")
 @keeps_its_inputs
 def play(
     fit: Any, *, poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 3.0, draws: int = 200,
-    seed: int = 0, out: str | os.PathLike[str] = "play.html", **on: Unpack[HoldingOptions],
-) -> Answer[Scores]:  # fmt: skip
-    """Write a page in which the identified rig moves: push it, drag its poles, see which rigs of the fit it holds.
+    seed: int = 0, out: str | os.PathLike[str] | None = None, **on: Unpack[HoldingOptions],
+) -> Played:  # fmt: skip
+    """Make a page in which the identified rig moves: push it, drag its poles, see which rigs of the fit it holds.
 
     The rig is simulated in the page, with dry friction, delay, encoder counts and limit; no request leaves it. Beside
     it the rigs that the covariance of the fit allows run under the same law at every change.
@@ -58,15 +60,15 @@ def play(
         How many they are.
     seed : int
         Of their draw.
-    out : path
-        The page, a file ending in .html.
+    out : path, optional
+        Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
     **on
         Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 
     Returns
     -------
-    Answer
-        Of the `Scores` of the rigs, as `chance` has them for the same draw.
+    Played
+        With the `Scores` of the rigs, as `chance` has them for the same draw; `page` is its mark-up.
 
     Raises
     ------
@@ -79,8 +81,8 @@ def play(
     from upright.rig.completion import completed, doubts
     from upright.verbs.control.design import design
 
-    path = Path(out)
-    if path.suffix != ".html":
+    path = None if out is None else Path(out)
+    if path is not None and path.suffix != ".html":
         raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
     if not 0 < seconds <= 20:
         raise BadInput(f"rigs in a page run more than 0 and at most 20 s, got {seconds:g} s.")
@@ -105,9 +107,34 @@ def play(
         title=f"The {rig.name} in a page", verdict=_verdict(held, draws), sound=held > 0.95 * draws,
         warnings=tuple(doubts(known, rig)),
         steps=(Step("Open the page in a browser, push the pendulum, drag the poles."),),
-        numbers={"held": held, "draws": draws, "seed": seed, "page": str(path)},
+        numbers={"held": held, "draws": draws, "seed": seed} | ({} if path is None else {"page": str(path)}),
     )  # fmt: skip
-    return Answer(scored, resting_on(chapter, known.basis, SIMULATED), [replace_file(path, text.encode())])
+    files = [] if path is None else [replace_file(path, text.encode())]
+    return Played(scored, resting_on(chapter, known.basis, SIMULATED), files, text)
+
+
+class Played(Answer["Scores"]):
+    """What becomes of the rigs, and the page in which one of them moves; a notebook shows the page."""
+
+    def __init__(self, scored: Scores, chapter: Chapter, files: Sequence[Path], page: str) -> None:
+        super().__init__(scored, chapter, files)
+        self.page = page
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f'<iframe sandbox="allow-scripts" width="100%" height="1180" srcdoc="{escape(self.page)}"></iframe>'
+
+
+def live_part(name: str, draw: Callable[[], str]) -> tuple[Part, ...]:
+    """The part of a report in which a rig moves; none where something is not known that it would take."""
+    from upright.report.page import Live, Part
+
+    try:
+        markup = draw()
+    except UprightError:
+        return ()
+    return (Part("Push it", (Live(markup=markup, description=f"The {name}, to be pushed"),), aside=True),)
 
 
 def unplayable(rig: Rig) -> str | None:
