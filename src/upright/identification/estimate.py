@@ -203,7 +203,7 @@ def _check(rig: GreyBox, runs: Sequence[Run], method: str) -> None:
     if not runs:
         raise BadInput("an identification needs at least one run with role 'fit', none came; set it for one run.")
     if not rig.estimated:
-        raise BadInput("nothing is asked: no parameter is to be estimated; give at least one a guess.")
+        raise BadInput("no parameter is to be estimated; give at least one a guess.")
     for run in runs:
         if run.t.size < 10:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")

@@ -92,7 +92,7 @@ def doubts(known: Rig, run: Rig, truth: Rig | None = None) -> tuple[str, ...]:
     hardware = run.hardware
     sheets = [n for n, e in hardware.entries.items() if e.source.startswith("data sheet")]
     if sheets:
-        out.append(f"From the data sheet of the {hardware.vendor}, not said of this rig: {_list(sheets)}.")
+        out.append(f"From the data sheet of the {hardware.vendor}, not specified for this rig: {_list(sheets)}.")
     make = make_of_vendor(hardware.vendor, known.plant)
     if make is not None and run.plant != known.plant:
         out.append(f"The fit knows no dry friction; simulations have that of the {make.rig.name} as designed.")

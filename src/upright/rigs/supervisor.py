@@ -237,13 +237,13 @@ class Supervisor:
         if abs(readings[-1] - self.target[-1]) > self.duty.near:
             self._give_up(
                 Fault.START, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
-                f"where it is to be held, and a run starts within {self._shown(self.duty.near)}; bring it there.",
+                f"where it is to be stabilised, and a run starts within {self._shown(self.duty.near)}; bring it there.",
             )  # fmt: skip
         first = RunningLaw(self.law, self.about.period).step(readings, 0.0)  # a reference may ask for all there is
         if abs(first) >= self.held.command:
             self._give_up(
                 Fault.START, f"the law would begin with its largest command, {first:.3g} {self.about.command_unit}; "
-                "bring the rig closer to where it is to be held, and let it rest.",
+                "bring the rig closer to where it is to be stabilised, and let it rest.",
             )  # fmt: skip
 
     def step(self, tick: Tick, reference: float | None = None) -> float:

@@ -193,7 +193,7 @@ def vendor_of(known: Rig, rig: str, on: RigOptions, source: str) -> str:
 
     make = make_of_rig(known)
     if rig != make.key:
-        raise BadInput(f"{source} is of the make '{make.key}', not '{rig}'; leave --rig out.")
+        raise BadInput(f"{source} is a '{make.key}', not '{rig}'; leave --rig out.")
     return vendor or make.vendor
 
 

@@ -205,7 +205,7 @@ def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
         Of the phases.
     """
     if kind not in ("multisine", "sweep"):
-        raise BadInput(f"a rig is asked by 'sines', a 'multisine' or a 'sweep', not by '{kind}'.")
+        raise BadInput(f"a rig is excited by 'sines', a 'multisine' or a 'sweep', not by '{kind}'.")
     tick, (low, high) = rig.period * EVERY, make.band
     if kind == "multisine":
         base = 2 * math.pi / (LENGTH * tick)

@@ -117,7 +117,7 @@ def _steps(result: Weighing) -> tuple[Step, ...]:
                 "Weigh the body again from one log of each loading, as you would your own.",
                 f"upright loadings {files} {added} -o {typed(result.folder / 'again')}",
             ),
-            Step("See which masses would have told most.", f"upright plan-inertias --rig {campaign.kind}"),
+            Step("See which masses are most informative.", f"upright plan-inertias --rig {campaign.kind}"),
         )
     files = " ".join(typed(result.folder / file) for file in campaign.files.values())
     added = added_options(campaign, campaign.files)

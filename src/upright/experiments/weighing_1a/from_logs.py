@@ -77,7 +77,7 @@ def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Cha
     column = next(iter(result.logs.values())).outputs[0]
     result = result if folder is None else result.written(folder)
     files = result.files
-    steps = [Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}")]
+    steps = [Step("See which masses are most informative.", f"upright plan-inertias --rig {kind}")]
     if files:
         again = f"upright loadings {' '.join(files.values())} {added_options(result, files)}"
         steps.insert(0, Step("Weigh the rig again from its logs in that folder, as you would your own.", again))

@@ -44,7 +44,7 @@ def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
         return ()
     flips, turns = changes
     advice = [
-        f"set sign = -1 for {c}, or take it out where it is said (the sign looks reversed)"
+        f"set sign = -1 for {c}, or take it out where it stands (the sign looks reversed)"
         for c, s in flips.items()
         if s < 0
     ]

@@ -116,4 +116,4 @@ def flash(
 def _last(text: str) -> str:
     """The flasher's last word, as a sentence."""
     lines = [line.strip() for line in text.splitlines() if line.strip() and "done" not in line]
-    return (lines[-1].rstrip(".") if lines else "it said nothing") + "."
+    return (lines[-1].rstrip(".") if lines else "it printed nothing") + "."

@@ -39,7 +39,7 @@ def parameters_left_at_zero(table: TomlTable, plant: type[Plant], names: Iterabl
     """Add parameters that nobody asks for yet, commented out."""
     names = list(names)
     if names:
-        table.line("# left at zero until asked for:")
+        table.line("# zero until estimated:")
     for name in names:
         what = plant.quantity(name)
         unit = "" if what.unit == "1" else f" {what.unit}"

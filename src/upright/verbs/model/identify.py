@@ -184,7 +184,7 @@ def identify(
         raise BadInput(f"{label}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
     if not requested.model.estimated:
         raise BadInput(
-            f'{label}: nothing is asked; give a parameter a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
+            f'{label}: nothing to estimate; give one a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
             " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
         )
     if not fitted:
