@@ -36,9 +36,7 @@ def test_a_fit_plays(tmp_path):
     t = np.arange(0, 6, 2e-3)
     u = np.where(t < 5, 1.2 * np.sign(np.sin(2 * math.pi * 0.7 * t)), 0.0)
     motion = up.simulate(RIG, u=u, at="hanging", seconds=6.0)
-    fit = up.identify(
-        motion, up.Furuta, known={"m_p": 0.135, "r": 0.16, "actuator.gain": 0.65}, columns={"T": "T"}
-    )
+    fit = up.identify(motion, up.Furuta, known={"m_p": 0.135, "r": 0.16, "actuator.gain": 0.65}, columns={"T": "T"})
     played = fit.play(limit="3 V", period="2 ms", counts=4096, draws=16, out=tmp_path / "play.html")
     assert played.numbers["held"] == 16
     assert (tmp_path / "play.html").stat().st_size < 150_000
