@@ -15,7 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.control.play import live_page, live_part
+from upright.verbs.control.moving import live_page, live_part
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
 from upright.verbs.options import DesignOptions, above_zero, as_typed, known_options, rig_entries

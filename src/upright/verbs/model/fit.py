@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from upright.rig import Rig
     from upright.study.load import Study
     from upright.study.stored_fit import StoredFit
-    from upright.verbs.control.play import Played
+    from upright.verbs.control.moving import Played
 
 
 class FitAnswer(Answer["Fit"]):
@@ -82,9 +82,9 @@ class FitAnswer(Answer["Fit"]):
 
     def play(self, **options: Any) -> Played:
         """The identified rig, moving in a page; options as for `up.play`."""
-        from upright.verbs.control.play import play
+        from upright.verbs.control.moving import played
 
-        return play(self, **options)
+        return played(self.fitted.rig(seed=options.get("seed", 0), draws=options.get("draws", 200)), **options)
 
     @property
     def parameters(self) -> Any:

@@ -166,7 +166,7 @@ def identify(
     from upright.report.symbols import typed
     from upright.study.results import fit_content, write_fit
     from upright.study.windows import windows
-    from upright.verbs.control.play import live_part, play
+    from upright.verbs.control.moving import live_part
     from upright.verbs.pages import folder_if_given, write_page
     from upright.workers import Workers
 
@@ -210,7 +210,7 @@ def identify(
     page = replace(page, numbers=fit_content(fit, requested, crossed))
     answer = FitAnswer(fit, page, written, requested, crossed)
     if folder is not None and (report or pdf):
-        moves = live_part(requested.title or "rig", lambda: play(answer).page)
+        moves = live_part(requested.title or "rig", lambda: answer.play().page)
         written += write_page(replace(page, parts=(*page.parts, *moves)), folder / "report.html", pdf)
     return FitAnswer(fit, page, written, requested, crossed)
 
