@@ -92,7 +92,7 @@ class SerialRig:
             )
         if not all(math.isfinite(n) and n != 0.0 for n in counts) or not 0.0 < full_scale < math.inf:
             raise BadInput(f"counts must not be zero and the full scale above it, got {counts} and {full_scale:g}.")
-        self._given, self._line = line, None if isinstance(line, str) else line
+        self._of, self._line = line, None if isinstance(line, str) else line
         self._coordinates, self._counts = tuple(coordinates), tuple(float(n) for n in counts)
         self._unit, self._full_scale, self._period = command_unit, full_scale, period
         self._patience, self._lockstep, self._resend, self._clock = patience, lockstep, resend, clock
@@ -119,9 +119,9 @@ class SerialRig:
     def open(self) -> Capabilities:
         """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
         if self._line is None:
-            if not isinstance(self._given, str):
+            if not isinstance(self._of, str):
                 raise RigStopped("Its line was closed; make the rig anew with another line.")
-            self._line = open_line(self._given)
+            self._line = open_line(self._of)
         self._parser = wire.Parser()
         self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
         hello = self._greet(1)

@@ -95,18 +95,18 @@ def predict(
     rig = replace(requested.model, substeps=fitted.substeps)
     runs = [replace(run, role="predict") for run in requested.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
-    kept = promise(scores, fitted.bands, fitted.scores)
+    promised = promise(scores, fitted.bands, fitted.scores)
     names = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,
-        "verdict": kept.sentence,
-        "as_promised": kept.holds,
+        "verdict": promised.sentence,
+        "as_promised": promised.holds,
         "runs": {label: {name: getattr(s, name) for name in names} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     page = Chapter(
-        title=f"{of} on {on}", verdict=kept.sentence, sound=kept.holds, numbers=numbers,
+        title=f"{of} on {on}", verdict=promised.sentence, sound=promised.holds, numbers=numbers,
         parts=(
             Part(
                 "How much of each signal is explained",
