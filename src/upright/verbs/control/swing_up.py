@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         "lie": 'An encoder shows a multiple of what is true: "theta=2".',
     },
     ranges={"seconds": (1.0, 120.0)},
-    wrong=lambda done: not done.value.sound,  # whatever its model is worth
+    wrong=lambda answer: not answer.value.sound,  # whatever its model is worth
     more="""
     upright swing-up --rig linear --seed 3
 
