@@ -32,6 +32,15 @@ def test_numbers_on_a_mega_are_arduino_s(drive):
         assert MEGA[pin.number] == pin.name
 
 
+def test_numbers_of_a_pico_can_do_what_they_are_for():
+    """RP2040's data sheet, table 2 (functions of GP0, GP1, GP16, GP17), and the Pico's, 2.1 (GP25 is its LED)."""
+    by_signal = {pin.signal: pin for pin in pins(BOARDS["pico"], "pair")}
+    assert {n: by_signal[n].number for n in ("HOST_TX", "HOST_RX", "FORWARD", "REVERSE", "LED")} == {
+        "HOST_TX": 0, "HOST_RX": 1, "FORWARD": 16, "REVERSE": 17, "LED": 25,
+    }  # fmt: skip
+    assert all(pin.name == f"GP{pin.number}" for pin in by_signal.values())
+
+
 @pytest.mark.parametrize(("board", "drive"), EVERY, ids=lambda v: getattr(v, "name", v))
 def test_every_wire_is_drawn_between_its_pin_and_its_terminal(board, drive):
     wires = pins(board, drive)

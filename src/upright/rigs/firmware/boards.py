@@ -68,11 +68,16 @@ BOARDS: Mapping[str, BoardKind] = {
             tools={"make": "make", "avr-gcc": "gcc-avr avr-libc"}, flasher="avrdude",
             usb=(0x2341, 0x2A03, 0x1A86, 0x0403, 0x10C4),
         ),
+        BoardKind(
+            name="pico", title="Raspberry Pi Pico", drives=(PAIR, SIGN), suffix="uf2",
+            tools={"make": "make", "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi"},
+            usb=(0x0403, 0x10C4, 0x1A86),
+        ),
     )
 }  # fmt: skip
 """By name."""
 
-_SAME = {"mega": "atmega2560", "mega2560": "atmega2560"}
+_SAME = {"mega": "atmega2560", "mega2560": "atmega2560", "rp2040": "pico"}
 _TOO_SMALL = ("uno", "nano", "leonardo", "micro", "atmega328p", "atmega32u4")
 
 
@@ -89,7 +94,7 @@ def board_of(name: str) -> BoardKind:
         raise BadInput(
             f"the firmware is not for an {name.capitalize()}: it has 2 kB of memory, and frames, limits and the law "
             "take 3 kB; two encoders, the host and 20 kHz PWM take timers and interrupts that it does not have. "
-            "Take an Arduino Mega 2560 (--board mega)."
+            "Take an Arduino Mega 2560 (--board mega) or a Raspberry Pi Pico (--board pico)."
         )
     word = _SAME.get(word, word)
     if word not in BOARDS:
