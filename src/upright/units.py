@@ -138,6 +138,16 @@ def scale(unit: str) -> float:
     return _si(unit)[0]
 
 
+PARTS = {1e-2: 1e2, 1e-3: 1e3, 1e-6: 1e6, 1e-9: 1e9}
+"""Factors of decimal prefixes that float64 does not hold, and what divides as they multiply."""
+
+
+def converted(value: Any, factor: float) -> Any:
+    """A number or an array times a factor; 9750 times a thousandth is then 9.75 to the last bit, as it is written."""
+    per = PARTS.get(abs(factor))
+    return value * factor if per is None else value / math.copysign(per, factor)
+
+
 def same_dimension(unit: str, other: str) -> bool:
     """Whether two units measure the same thing; a radian counts as 1."""
     return _si(unit)[1] == _si(other)[1]
