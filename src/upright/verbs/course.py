@@ -131,6 +131,9 @@ def lab(
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
+    rig = os.fspath(rig) if isinstance(rig, os.PathLike) else rig
+    if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
+        raise BadInput(f"a laboratory's rig is a make, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
     itself = rig.endswith(".toml") or rig.startswith("serial:")
     if rig and not itself:
         make_named(rig)
