@@ -96,7 +96,7 @@ def predict(
     runs = [replace(run, role="predict") for run in requested.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
     kept = promise(scores, fitted.bands, fitted.scores)
-    names = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
+    names = ("beyond", "role", "fit_percent", "horizon", "adapted", "offer", "inside")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,
