@@ -16,12 +16,12 @@ from benchmarks.measure import Line, of_each
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Median errors and how often the intervals hold, per kind of rig and quantity."""
     from upright.experiments.weighing_1a.run import drawn_twin, measure_body
-    from upright.rig.makes import OSCILLATORS
+    from upright.rig.makes import BODIES
 
     lines: list[Line] = []
     seeds = range(1, 6 if quick else 101)
     measure_body(drawn_twin())  # compiles
-    for kind in OSCILLATORS:
+    for kind in BODIES:
         progress(kind)
         done, each = of_each(lambda seed, kind=kind: measure_body(drawn_twin(seed, kind)), seeds)
         pairs = [((d.loadings.k, d.on.stiffness), (d.loadings.bare, d.on.bare)) for d in done]

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from benchmarks.hazards import board, firmware, logs, sound, twin
+from benchmarks.hazards import board, firmware, logs, twin
 from benchmarks.hazards.killed import killed
 from benchmarks.hazards.story import (
     LIMITS,
@@ -81,13 +81,30 @@ def _wraps(story: Story) -> None:
     story.on.tap(5.0)
 
 
+def _slips(channel: int, speed: float) -> Callable[[Story], None]:
+    """An encoder loses so much a second [rad/s]."""
+
+    def slips(story: Story) -> None:
+        known = story.column.known
+        story.on.encoders.slipping(channel, speed * known.per_unit[channel] * known.period)
+
+    return slips
+
+
+def _slow_tick(story: Story) -> None:
+    """The board's tick takes twice its length, and only the host's clock knows."""
+    story.on.port.ticks_long = 2
+    story.beside.clock = lambda: story.on.port.true_time
+
+
 SOUND = tuple(
     Hazard(what=f"nothing broken, a tap of {speed:g} rad/s", by=F(0), stands=True,
            tell=in_loop(lambda s: None, after=1.0, taps=speed)) for speed in (0.5, 1.0, 2.0)
 )  # fmt: skip
 ENCODERS = (
-    Hazard(what="pendulum's encoder dead, moving", by=F.MODEL, tell=in_loop(lambda s: s.on.encoders.dead(1))),
-    Hazard(what="pendulum's encoder dead, at rest, then a tap of 1 rad/s", by=F.MODEL | F.OVERTRAVEL,
+    Hazard(what="pendulum's encoder dead, moving", by=F.ENCODER | F.MODEL,
+           tell=in_loop(lambda s: s.on.encoders.dead(1))),
+    Hazard(what="pendulum's encoder dead, at rest, then a tap of 1 rad/s", by=F.ENCODER | F.MODEL | F.OVERTRAVEL,
            tell=in_loop(lambda s: s.on.encoders.dead(1), after=STILL, tilt=0.0, taps=1.0)),
     Hazard(what="arm's encoder dead, moving", by=F.ENCODER | F.MODEL,
            tell=in_loop(lambda s: s.on.encoders.dead(0))),
@@ -97,7 +114,7 @@ ENCODERS = (
            tell=at_start(lambda s: s.on.encoders.dead(0))),
     Hazard(what="pendulum's encoder dead before the start", by=F.SELF_TEST,
            tell=at_start(lambda s: s.on.encoders.dead(1))),
-    Hazard(what="pendulum's sign flips, moving", by=F.MODEL | F.OVERTRAVEL,
+    Hazard(what="pendulum's sign flips, moving", by=F.MODEL | F.OVERTRAVEL | F.OVERSPEED,
            tell=in_loop(lambda s: s.on.encoders.scaled(1, -1.0))),
     Hazard(what="arm's sign flips, moving", by=F.MODEL | F.OVERTRAVEL,
            tell=in_loop(lambda s: s.on.encoders.scaled(0, -1.0))),
@@ -116,6 +133,8 @@ ENCODERS = (
       for factor in (2.0, 4.0)),
     Hazard(what="pendulum loses 200 counts at once (4.5 degrees)", by=F.OVERSPEED | F.MODEL,
            tell=in_loop(lambda s: s.on.encoders.lost(1, 200))),
+    *(Hazard(what=f"pendulum's encoder slips by {rate:g} deg/s", by=F.MODEL,
+             tell=in_loop(_slips(1, math.radians(rate)), then=10.0)) for rate in (0.45, 1.1)),
     Hazard(what="pendulum loses 20 counts at once", by=F.MODEL, stands=True,
            tell=in_loop(lambda s: s.on.encoders.lost(1, 20))),
 )  # fmt: skip
@@ -152,6 +171,11 @@ LIMITED = (
 ON_THE_TWIN = (
     *SOUND, *ENCODERS,
     Hazard(what="pendulum's counter wraps at 2^13", by=F.OVERSPEED | F.OVERTRAVEL | F.MODEL, tell=in_loop(_wraps)),
+    *(Hazard(what=f"supply at {100 * share:.0f} %, then taps", by=F.MODEL,
+             tell=in_loop(lambda s, share=share: setattr(s.on.port, "strength", share), taps=1.0))
+      for share in (0.5, 0.3)),
+    Hazard(what="the board's tick takes twice its length", by=F.MODEL,
+           tell=in_loop(_slow_tick, first=lambda s: setattr(s.beside, "clock", lambda: s.on.port.true_time))),
     *TIMES,
     Hazard(what="host killed (-9)", by=F.WATCHDOG, within=LIMITS.watchdog, tell=silent(1.0)),
     Hazard(what="link cut", by=F.WATCHDOG, within=LIMITS.watchdog,
@@ -255,35 +279,6 @@ def judged(hazard: Hazard, column: Column, found: Happened) -> Line:
     )
 
 
-def left_alone(*, quick: bool, progress: Callable[[str], None]) -> tuple[list[Line], list[str]]:
-    """Loops in which nothing is broken, as lines of the benchmark and of the page."""
-    lines: list[Line] = []
-    body = ["", "## Nothing broken", "", *str(sound.__doc__).splitlines()[2:], "", *SOUND_HEAD]
-    for make in sound.MAKES[: 1 if quick else None]:
-        for kind in sound.KINDS:
-            progress(f"nothing broken: {make}, {kind}")
-            found = sound.all_of(make, kind, sound.QUICK if quick else sound.SEEDS)
-            stopped = (found.still + found.scale) / found.runs
-            note = f"{found.runs} runs; {found.filters} stopped by the bank of filters"
-            lines.append(
-                Line(
-                    contender=f"nothing broken: {found.make}, {kind}",
-                    ratio=(stopped, stopped, stopped),
-                    target=Target(most=0.0),
-                    note=note,
-                )
-            )
-            row = found.make, kind, found.runs, found.scale, found.still, found.filters
-            body.append(f"| {' | '.join(map(str, row))} |")
-    return lines, body
-
-
-SOUND_HEAD = (
-    "| rig | loop | runs | stopped by command and pendulum | by a count that does not come | by the bank of filters |",
-    "|---|---|--:|--:|--:|--:|",
-)
-
-
 def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None = None) -> list[Line]:
     """Break everything in turn, on every column that can run here; `quick`, every eighth thing."""
     lines: list[Line] = []
@@ -309,9 +304,6 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             if found.overran:
                 after = 1e3 * (found.zero_after or 0.0)
                 late.append(f"- {column.name}: {hazard.what} ({found.stopped_by} after {after:.0f} ms)")
-    alone, table = left_alone(quick=quick, progress=progress)
-    lines += alone
-    body += table
     if markdown:
         missed = [f"- {line.contender} ({line.note})" for line in lines if line.reached is False]
         travel = f"{math.degrees(LIMITS.travel[0]):.0f} degrees"

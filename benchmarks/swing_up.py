@@ -78,8 +78,9 @@ def _sensors(make: str, count: int) -> list[Line]:
     from upright import gains
     from upright.control import design_swing_up, trial
     from upright.control.score import FALLEN
-    from upright.control.sensors import Suspicion, Watch, probe, scales, shown_by_encoders
+    from upright.control.sensors import probe, scales, shown_by_encoders
     from upright.control.trial import readings
+    from upright.control.watch import Suspicion, Watch
     from upright.rig.makes import make_rig
 
     model = make_rig(make)

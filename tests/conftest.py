@@ -5,6 +5,9 @@ import os
 # The matrices here are small: threads of the linear algebra only wait for each other and for other tests.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# Nobody can answer here whether a plant of a test's own may run; what is asked is tested where this is taken away.
+os.environ.setdefault("UPRIGHT_ALLOW_CODE", "1")
+
 import pytest
 
 

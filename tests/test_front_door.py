@@ -101,7 +101,7 @@ def test_a_record_a_frame_and_a_study_give_the_same_fit(fit, tmp_path):
     ("options", "sentence"),
     [
         ({"known": {"m": 1.0}}, "has no number 'm'"),
-        ({"known": {"m_p": 1.0}, "ask": ["m_p"]}, "known and asked at once"),
+        ({"known": {"m_p": 1.0}, "ask": ["m_p"]}, "known and estimated at once"),
         ({"ask": ["l_cgg"]}, "did you mean 'l_cg'"),
         ({"columns": {"theta": "angle"}}, "no column 'angle'"),
         ({"units": {"angle": "deg"}}, "units names columns"),

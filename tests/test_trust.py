@@ -1,5 +1,6 @@
 """Is code that came with somebody's study announced before it runs for the first time, and refused where asked?"""
 
+import io
 import json
 
 import numpy as np
@@ -11,7 +12,7 @@ from upright.diagnosis.case import read_known
 from upright.errors import BadInput
 from upright.study.load import load_study
 from upright.study.stored_rig import read_stored_rig
-from upright.trust import no_code
+from upright.trust import allow_code, no_code
 
 PLANT = """
 from pathlib import Path
@@ -90,7 +91,7 @@ def test_code_that_changed_at_a_known_path_is_announced_as_changed(elsewhere, ca
         (elsewhere / "mine.py").write_text(f"{PLANT}\n{version}\n", encoding="utf-8")
         load_study(elsewhere / "study.toml")
         said = capsys.readouterr().err
-        assert "mine.py, which has changed since it was met here; look into it" in said
+        assert "mine.py, which has changed since it was met here" in said
         assert said.count("\n") == 1
         load_study(elsewhere / "study.toml")
         met_before(monkeypatch)
@@ -149,3 +150,56 @@ def test_the_command_line_refuses_code_wherever_the_option_stands(elsewhere, mon
 def test_a_shipped_plant_is_no_code(elsewhere):
     with no_code(), pytest.raises(BadInput, match="needs m_p"):
         load_study(elsewhere / "study.toml", text=STUDY.replace("mine.py:Mine", "pendulum").replace("m = ", "l_cg = "))
+
+
+class Terminal(io.StringIO):
+    """A person at a terminal."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_code_runs_nowhere_unasked_where_nobody_can_answer(elsewhere, monkeypatch, reader):
+    monkeypatch.delenv("UPRIGHT_ALLOW_CODE")
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))  # a pipe is nobody
+    with pytest.raises(BadInput, match=r"mine\.py, which was not met here before, and nobody agreed to that.*--allow-"):
+        READERS[reader](elsewhere)
+    assert not (elsewhere / "ran").exists()
+    with allow_code():
+        READERS[reader](elsewhere)
+    assert (elsewhere / "ran").exists()
+    met_before(monkeypatch)
+    READERS[reader](elsewhere)  # what was agreed to is remembered by its hash
+    met_before(monkeypatch)
+    (elsewhere / "mine.py").write_text(PLANT + "\n# of somebody else\n", encoding="utf-8")
+    with pytest.raises(BadInput, match="which has changed since it was met here, and nobody agreed"):
+        READERS[reader](elsewhere)
+
+
+@pytest.mark.parametrize(
+    ("answer", "runs"), [("y\n", True), ("yes\n", True), ("n\n", False), ("\n", False), ("", False)]
+)
+def test_a_person_at_a_terminal_is_asked_once(elsewhere, monkeypatch, answer, runs):
+    monkeypatch.delenv("UPRIGHT_ALLOW_CODE")
+    monkeypatch.setattr("sys.stdin", Terminal(answer))
+    monkeypatch.setattr("sys.stderr", asked := Terminal())
+    if runs:
+        load_study(elsewhere / "study.toml")
+        load_study(elsewhere / "study.toml")
+    else:
+        with pytest.raises(BadInput, match="nobody agreed"):
+            load_study(elsewhere / "study.toml")
+    assert (elsewhere / "ran").exists() == runs
+    assert asked.getvalue().count("Run it? [y/N]") == 1
+
+
+@pytest.mark.parametrize("words", ["--allow-code identify study.toml", "identify study.toml --allow-code"])
+def test_the_command_line_allows_code_wherever_the_option_stands(elsewhere, monkeypatch, words):
+    monkeypatch.delenv("UPRIGHT_ALLOW_CODE")
+    monkeypatch.chdir(elsewhere)
+    refused = CliRunner().invoke(app, [w for w in words.split() if w != "--allow-code"])
+    assert "nobody agreed to that" in refused.stderr
+    assert not (elsewhere / "ran").exists()
+    CliRunner().invoke(app, words.split())
+    assert (elsewhere / "ran").exists()

@@ -18,9 +18,22 @@ class TracedPort(TwinPort):
     def __init__(self, rig: Any, at: str = "") -> None:
         super().__init__(rig, at)
         self.trace: list[tuple[float, ...]] = []
+        self.strength, self.obeys, self.ticks_long, self.true_time = 1.0, True, 1, 0.0
+
+    def write(self, command: float) -> None:
+        if self.obeys:
+            super().write(self.strength * command)
+
+    def enable(self, on: bool) -> None:
+        if self.obeys:
+            super().enable(on)
 
     def advance(self) -> float:
+        for _ in range(self.ticks_long - 1):  # its timer is slow, and it counts its ticks all the same
+            super().advance()
+            self._periods -= 1
         t = super().advance()
+        self.true_time += self.ticks_long * self.rig.period
         self.trace.append((t, float(self._commands[-1, 0]), *self.x[0::2].tolist()))
         return t
 

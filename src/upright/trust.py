@@ -1,7 +1,9 @@
 """Whose Python code runs here? A study or a fit may name a plant in a file beside it, and to read it is to run it.
 
-A file whose content this user has not met before, at a new path or changed at a known one, is announced on stderr
-before it runs. With ``--no-code`` on the command line, or ``UPRIGHT_NO_CODE=1``, such files are refused.
+A file whose content this user has not agreed to before, at a new path or changed at a known one, runs only when the
+person at the terminal says yes; where nobody can answer, with ``--allow-code`` on the command line, `allow_code` in a
+program, or ``UPRIGHT_ALLOW_CODE=1``. What was agreed to is remembered by its hash. With ``--no-code``, or
+``UPRIGHT_NO_CODE=1``, all such files are refused.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from upright.errors import BadInput
 from upright.files import read_bytes
 
 _REFUSED: ContextVar[bool] = ContextVar("refused", default=False)
+_ALLOWED: ContextVar[bool] = ContextVar("allowed", default=False)
 
 
 @contextmanager
@@ -35,13 +38,29 @@ def no_code(refused: bool = True) -> Generator[None]:
         _REFUSED.reset(before)
 
 
+@contextmanager
+def allow_code(allowed: bool = True) -> Generator[None]:
+    """Agree to plants in files of their own while this lasts; each is announced and remembered by its hash.
+
+    Examples
+    --------
+    >>> with allow_code():
+    ...     pass  # up.identify("of_a_colleague.toml")
+    """
+    before = _ALLOWED.set(allowed or _ALLOWED.get())
+    try:
+        yield
+    finally:
+        _ALLOWED.reset(before)
+
+
 def before_running(plant: str, by: Path) -> None:
-    """Say, once for each content, that `by` (a study or a fit) runs the code of the plant that it names.
+    """Ask, once for each content, whether `by` (a study or a fit) may run the code of the plant that it names.
 
     Raises
     ------
     BadInput
-        When code is refused.
+        When code is refused, or nobody agreed to it.
     """
     from hashlib import sha256
 
@@ -60,14 +79,28 @@ def before_running(plant: str, by: Path) -> None:
         return  # who reads it says so
     where = sha256(str(file.resolve()).encode(errors="replace")).hexdigest()
     met = _met()
-    if content not in met and sys.stderr is not None:
+    if content not in met:
         what = "has changed since it was met here" if where in met else "was not met here before"
-        print(
-            f"upright: {by} runs the Python code of {file}, which {what}; look into it if it is from somebody else"
-            " (--no-code refuses it).",
-            file=sys.stderr,
-        )
+        if not _agreed(f"{by} runs the Python code of {file}, which {what}"):
+            raise BadInput(
+                f"{by} would run the Python code of {file}, which {what}, and nobody agreed to that; read the file, "
+                "then say --allow-code (in a program upright.trust.allow_code, or UPRIGHT_ALLOW_CODE=1). It is asked "
+                "once for each content."
+            )
     _remember(content, where)
+
+
+def _agreed(what: str) -> bool:
+    """Whether this code may run: said beforehand, or by the person at the terminal."""
+    if _ALLOWED.get() or os.environ.get("UPRIGHT_ALLOW_CODE", "0") not in ("", "0"):
+        if sys.stderr is not None:
+            print(f"upright: {what}.", file=sys.stderr)
+        return True
+    if sys.stdin is None or sys.stderr is None or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    print(f"upright: {what}. Look into it first if it is from somebody else. Run it? [y/N] ", end="", file=sys.stderr)
+    sys.stderr.flush()
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 _SINCE_START: set[str] = set()

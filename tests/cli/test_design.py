@@ -127,9 +127,9 @@ def test_a_lag_takes_effort_and_margin(study, tmp_path):
     ("fitted", "options", "samples", "said"),
     [
         (3e-3, (), 1.5, "as the file says"),  # 3 ms of 2 ms samples, and no sample of computing besides
-        (3e-3, ("--delay", "2"), 2.0, "as asked"),
+        (3e-3, ("--delay", "2"), 2.0, "as requested"),
         (0.0, (), 1.0, "assumed"),
-        (0.0, ("--delay", "0"), 0.0, "as asked"),
+        (0.0, ("--delay", "0"), 0.0, "as requested"),
     ],
 )
 def test_a_delay_is_counted_once_and_its_source_is_told(tmp_path, fitted, options, samples, said):

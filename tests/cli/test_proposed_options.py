@@ -48,7 +48,7 @@ def options(command: str) -> set[str]:
 
 
 OPTIONS = {name: options(name) for name in [*COMMANDS, *(f"{a} {b}" for a, bs in NESTED.items() for b in bs)]}
-ALL = set().union(*OPTIONS.values()) | {"--version", "--no-code"}
+ALL = set().union(*OPTIONS.values()) | {"--version", "--no-code", "--allow-code"}
 
 
 def sentences(path: Path) -> Iterator[tuple[int, str]]:

@@ -68,7 +68,7 @@ def test_numbers_for_a_program_are_finite_json(fit, tmp_path):
         (["--set", "5"], "--set is 1 to 4, or all, got '5'"),
         (["--set", "1", "--poles", "-1,-2,-3,-4"], "either --set"),
         (["--speed", "fast"], "plain, filtered, kalman"),
-        (["--rig", "furuta"], "is of the make 'linear'"),
+        (["--rig", "furuta"], "is a 'linear'"),
         (["--start", "3 m"], "3 m"),
     ],
 )

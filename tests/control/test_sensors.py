@@ -10,28 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_discrete_are
 from scipy.special import ellipk
 
-from upright import gains as design
-from upright.control import design_swing_up, trial
-from upright.control.score import FALLEN
+from upright.control import design_swing_up
 from upright.control.sensors import (
-    ODDS,
-    UNKNOWN,
     Scales,
-    Suspicion,
-    Watch,
     _motion,
     lifted,
     probe,
     scales,
     shown_by_encoders,
-    sticking,
 )
-from upright.control.sensors import watched as guarded
 from upright.control.trial import readings
-from upright.experiments.nonideal import nonideal
 from upright.experiments.swing_up_2b.run import scales_of_log
 from upright.physics import Furuta
 from upright.readers import read
@@ -107,134 +97,6 @@ def test_a_large_swing_is_slower_by_what_the_elliptic_integral_says():
     assert period[0] / period[1] - 1 == pytest.approx(0.18, abs=0.005)
 
 
-@cache
-def loop(make):
-    """Watch, and the law it watches: set 1 of Table 1."""
-    rig = make_rig(make)
-    model = rig.linear("inverted")
-    sampled = model.to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
-    estimator = design.filtered(sampled, 0.8)
-    K = design.place_sampled(sampled, estimator, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
-    return Watch(rig), design.feedback(estimator, K)
-
-
-def watched(make, shown, seed=3, seconds=2.5):
-    watch, law = loop(make)
-    rig = replace(make_rig(make, seed), scales=shown)
-    rest = readings(rig, [0.0, math.pi])
-    run = trial(rig, law, at="inverted", start=[0.0, 0.0, 0.05, 0.0], seconds=seconds, rest=rest)
-    seen = np.column_stack([run.record[c.name] for c in rig.plant.coordinates]) - rest
-    return watch.over(seen, run.u), run
-
-
-@pytest.mark.parametrize("make", MAKES)
-def test_the_watch_speaks_before_the_fall(make):
-    first = make_rig(make).plant.coordinates[0].name
-    for shown, what in (
-        ((1.0, -1.0), Suspicion(name="theta", factor=-1.0)),
-        ((-1.0, 1.0), Suspicion(name=first, factor=-1.0)),
-        ((1.0, 0.5), Suspicion(name="theta", factor=0.5)),
-        ((4.0, 1.0), Suspicion(name=first, factor=4.0)),
-    ):
-        alarm, run = watched(make, shown)
-        fallen = np.flatnonzero(np.abs(run.deviation[:, 1]) > FALLEN)
-        k = int(alarm.sample[0])
-        assert 0 <= k < 0.75 * fallen[0]
-        assert abs(run.deviation[k, 1]) < math.radians(12)
-        assert alarm.what[0] == what
-    alarm, run = watched(make, (1.0, 1.0))
-    assert alarm.sample[0] == -1
-    assert np.abs(run.deviation[-1, 1]) < 0.02
-
-
-def test_the_filters_settle_on_the_riccati_gain():
-    rig = make_rig("linear")
-    watch, _ = loop("linear")
-    s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
-    W = design.process_noise(s, UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0]))
-    W[4:, 4:] += 1e-12 * np.eye(len(W) - 4)  # commands are known; scipy wants to be asked of something that moves
-    P = solve_discrete_are(s.A.T, s.C.T, W, np.diag(rig.resolution**2 / 12))
-    gain = np.linalg.solve(s.C @ P @ s.C.T + np.diag(rig.resolution**2 / 12), s.C @ P).T
-    # 0.35 s of settling leave this of the start, on which the filters of a falling body forget slowest
-    assert np.allclose(watch.gains[-1, 0], gain, rtol=0.01, atol=1e-5 * np.abs(gain).max())
-
-
-@pytest.mark.parametrize("which", [0, 1, 4, 6, 10])
-def test_a_likelihood_is_that_of_all_readings_at_once(which):
-    """Sums of a filter, sample by sample, against one Gaussian of all readings; the first two are not counted."""
-    rig, samples = make_rig("furuta"), 12
-    watch = Watch(rig, forgotten=math.inf)
-    suspicion = watch.suspicions[which]
-    s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
-    scale = np.array([suspicion.factor if c.name == suspicion.name else 1.0 for c in rig.plant.coordinates])
-    C, n, noise = scale[:, None] * s.C, len(s.A), rig.resolution**2 / 12
-    rng = np.random.default_rng(which)
-    start = np.append(rng.normal(size=4) / np.repeat(np.abs(scale), 2), np.zeros(n - 4))
-    y, known = np.zeros((samples, 2)), np.zeros((samples + 1, n))
-    for k in range(samples):
-        u = 300.0 + 100.0 * math.sin(k)  # of which every sample is evidence
-        y[k] = C @ (known[k] + np.linalg.matrix_power(s.A, k) @ start) + np.sqrt(noise) * rng.normal(size=2)
-        watch.see(y[k : k + 1], u)
-        known[k + 1] = s.A @ known[k] + u * s.B[:, 0]
-    # readings are linear in the start and in the shaking of every sample
-    of_start = np.vstack([C @ np.linalg.matrix_power(s.A, k) for k in range(samples)])
-    driven = rig.limit * np.abs(rig.linear("inverted").B[1::2, 0])
-    W = design.process_noise(s, UNKNOWN * driven / np.abs(scale))
-    cov = of_start @ np.diag([*np.repeat(scale, 2) ** -2.0, *np.zeros(n - 4)]) @ of_start.T
-    for i in range(1, samples):
-        later = np.vstack([np.zeros((2 * i, n)), of_start[: -2 * i]])
-        cov += later @ W @ later.T
-    cov += np.diag(np.tile(noise, samples))
-    away = (y - known[:-1] @ C.T).ravel()
-    begun, whole = (away[:m] @ np.linalg.solve(cov[:m, :m], away[:m]) + np.linalg.slogdet(cov[:m, :m])[1]
-                    for m in (4, 2 * samples))  # fmt: skip
-    # the condition of the covariance, 1 rad to a count, leaves half of the digits
-    assert watch.likelihood[0, which] == pytest.approx(-0.5 * (whole - begun), rel=1e-6)
-
-
-def test_sound_sensors_are_seldom_suspected():
-    """Ville's inequality: where the model is right, no suspicion ever gets c times as likely more often than 1/c."""
-    rig, runs, c = make_rig("furuta"), 200, 20.0
-    watch = Watch(rig, forgotten=math.inf)
-    s = rig.linear("inverted").to_sampled(rig.period, (rig.delay + rig.lag) / rig.period)
-    rng = np.random.default_rng(11)
-    sway = UNKNOWN * rig.limit * np.abs(rig.linear("inverted").B[1::2, 0])
-    x = np.zeros((runs, s.A.shape[0]))
-    x[:, :4] = rng.normal(size=(runs, 4))
-    highest = np.full((runs, len(watch.suspicions)), -np.inf)
-    for k in range(150):
-        y = x @ s.C.T + rng.normal(size=(runs, 2)) * rig.resolution / math.sqrt(12)
-        u = 2.0 * math.sin(0.1 * k)
-        watch.see(y, u)
-        highest = np.maximum(highest, watch.likelihood - watch.likelihood[:, :1])
-        a = sway * rng.normal(size=(runs, 2))
-        x = x @ s.A.T + u * s.B[:, 0]
-        x[:, 0:4:2] += a * rig.period**2 / 2
-        x[:, 1:4:2] += a * rig.period
-    often = np.mean(highest[:, 1:] > math.log(c), axis=0)
-    # three standard deviations of a share of 1/c over these runs
-    assert np.all(often <= 1 / c + 3 * math.sqrt((1 - 1 / c) / c / runs))
-    assert math.log(ODDS) > math.log(c)
-
-
-def test_a_watched_drive_stops_pushing():
-    """The same run up to the alarm, no command after it, and then no more energy than a falling pendulum has."""
-    watch, law = loop("linear")
-    rig = replace(make_rig("linear", 3), scales=(1.0, -1.0))
-    rest = readings(rig, [0.0, math.pi])
-    how = {"start": [0.0, 0.0, 0.05, 0.0], "seconds": 1.0, "rest": rest}
-    alone = trial(rig, law, at="inverted", **how)
-    run, alarm = guarded(watch, rig, law, **how)
-    k = int(alarm.sample[0]) + 1
-    assert 0 < k < 200
-    assert np.allclose(run.x[: k + 1], alone.x[: k + 1], rtol=0, atol=1e-9)
-    assert np.all(run.u[k:] == 0.0)
-    energy = rig.plant.energy(run.x[k + 2 * math.ceil(rig.lag / rig.period) :])
-    lost = np.diff(energy)
-    assert lost.max() < 1e-4 * np.ptp(energy)  # friction only takes, once the drive's lag is over
-    assert np.abs(run.x[:, 1]).max() < 0.5 * np.abs(alone.x[:, 1]).max()
-
-
 @pytest.mark.slow
 @pytest.mark.real_data
 @pytest.mark.parametrize("volts", [2, 4])
@@ -261,45 +123,6 @@ def test_a_real_encoder_that_counts_the_other_way_is_found(volts):
     assert "theta counts the wrong way round" in found.verdict
     assert np.all(np.abs(found.value - [1.0, -1.0]) < 3 * found.error)
     assert found.explained.min() > 0.99
-
-
-@pytest.mark.parametrize("make", ["furuta", "linear"])
-@pytest.mark.parametrize("tilt", [0.03, 0.08])
-def test_a_sound_loop_that_has_come_to_rest_is_not_suspected(make, tilt):
-    """Close to rest dry friction holds what the filters take for free; evidence of that adds up over seconds."""
-    model = make_rig(make)
-    linear = model.linear("inverted")
-    sampled = linear.to_sampled(model.period, model.delay / model.period)
-    gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
-    law = design.feedback(design.filtered(sampled, 0.5), gains.K)
-    run = trial(model, law, at="inverted", start=[0.0, 0.0, tilt, 0.0], seconds=5.0)
-    shown = np.column_stack([run.record[c.name] for c in model.plant.coordinates]) - run.rest
-    assert Watch(model).over(shown, run.u).sample[0] == -1
-
-
-@pytest.mark.parametrize(("make", "far", "seed"), [("furuta", 0.4, 1), ("linear", 0.05, 2)])
-def test_rounding_of_coarse_encoders_is_not_taken_for_a_lie(make, far, seed):
-    """2,000 counts a turn at 1.1 kHz: the same rounding for six samples is no evidence six times over."""
-
-    def coarse(rig):
-        return rig.replace(counts=tuple(c / 8 for c in rig.counts))
-
-    model = coarse(make_rig(make))
-    linear = model.linear("inverted")
-    sampled = linear.to_sampled(model.period, model.delay / model.period)
-    gains = design.place(linear.A, linear.B, [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.2220])
-    law = design.feedback(design.filtered(sampled, 0.5), gains.K)
-    truth, watch = coarse(nonideal(make_rig(make, seed), seed)), Watch(model)
-    run, alarm = guarded(watch, truth, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
-    assert alarm.sample[0] == -1
-    assert np.any(run.u[-200:] != 0.0)  # the drive stays on
-    swapped = replace(truth, scales=(1.0, -1.0))
-    run, alarm = guarded(watch, swapped, law, start=[far, 0.0, 0.02, 0.0], seconds=2.0)
-    spoke = int(alarm.sample[0])
-    assert np.all(run.u[spoke + 1 :] == 0.0)  # off for good, one sample after the alarm
-    assert abs(run.u[spoke]) == model.limit  # and not before: the wrong sign pushes with all there is
-    assert alarm.what[0].name == "theta"
-    assert 0 <= alarm.sample[0] * model.period < 0.1
 
 
 def weighed(value, error, explained):
@@ -350,27 +173,6 @@ def test_half_a_turn_by_hand_may_be_ten_degrees_off_either_way(degrees, fine):
     assert (words == "") == fine
     if not fine:
         assert f"shows {degrees:.0f} degrees for half a turn, {abs(degrees) / 180:.3g} times" in words
-
-
-def test_a_suspicion_says_the_sensor_and_its_factor():
-    assert str(Suspicion()) == "all sensors sound"
-    assert str(Suspicion(name="theta", factor=-1.0)) == "theta shown the wrong way round"
-    assert str(Suspicion(name="psi", factor=0.5)) == "psi shown 0.5 times what is true"
-
-
-def test_a_bank_suspects_each_sensor_of_each_factor():
-    watch, _ = loop("linear")
-    assert {(s.name, s.factor) for s in watch.suspicions} == {
-        ("", 1.0), *((n, f) for n in ("x", "theta") for f in (-1.0, 0.25, 0.5, 2.0, 4.0))
-    }  # fmt: skip
-    assert not watch.suspicions[0].name  # against which all others are weighed
-
-
-def test_dry_friction_of_the_driven_body_takes_its_share_of_the_command():
-    rig = replace(make_rig("furuta").changed(b_1c=0.3, b_2c=0.5), gain=-2.0)
-    assert sticking(rig) == pytest.approx(0.15)  # that of the pendulum's hinge is not the drive's
-    bare = make_rig("furuta").changed(b_1c=0.0, b_2c=0.5)
-    assert sticking(bare) == 0.0
 
 
 def test_a_blind_command_is_logged_with_its_end_and_nothing_after_it():

@@ -73,7 +73,7 @@ def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(
     assert with_margins(done, FINE, peak_sampled=10.0)._loop_verdict().endswith("takes 100 % of the drive's limit.")
     free = with_margins(done, FINE, request=replace(done.request, limit=None))
     assert free._loop_verdict() == "Stable with margin."
-    assert any("whether it saturates is not known" in w for w in chapter(free).warnings)
+    assert any("so saturation is not predicted" in w for w in chapter(free).warnings)
     assert not any("saturates" in w for w in chapter(done).warnings)
 
 
@@ -121,7 +121,7 @@ def test_who_says_how_late_a_command_acts_is_told(done):
     assert late.sampled.delay == pytest.approx(1.5)
     for design, words in (
         (late, "1.5 samples late (as the file says)"), (done, "1 samples late (assumed)"),
-        (design_for(ARM, replace(done.request, delay=2.0)), "2 samples late (as asked)"),
+        (design_for(ARM, replace(done.request, delay=2.0)), "2 samples late (as requested)"),
     ):  # fmt: skip
         assert words in chapter(design).parts[2].content[0]
     plain = StateSpace(A=[[-1.0]], B=[[1.0]], C=[[1.0]])
@@ -152,7 +152,7 @@ def test_poles_of_sampled_matrices_are_those_whose_motion_outlasts_a_third_of_a_
     told = chapter(design_for(model, DesignRequest(at="", poles=(-5.0, -20.0), period=5e-3, speed="")))
     rows = {row[0]: row[1] for row in tables(told)[1].rows}
     assert rows["model, open loop"][1:] == "3, and 1 faster"  # behind its minus
-    assert "faster" not in rows["asked"]
+    assert "faster" not in rows["requested"]
 
 
 def test_the_converter_of_the_drive_goes_into_the_file_and_none_where_nobody_named_one(done):

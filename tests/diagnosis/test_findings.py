@@ -167,7 +167,7 @@ def test_what_cannot_be_looked_for_is_said_with_its_reason():
     cart = find("rectilinear-1")
     alone = examine(record(x_1=SWING))
     assert alone.unchecked["effort"] == "the log has no effort column that could be recognised"
-    assert alone.unchecked["sign"] == "nobody said what the rig is; name it with --rig"
+    assert alone.unchecked["sign"] == "the rig is not specified; name it with --rig"
     assert set(alone.checked) == set(KINDS) - set(alone.unchecked) - {"settings"}
     assert alone.rigs
     assert (alone.samples, alone.duration, alone.rig) == (1000, pytest.approx(9.99), "")
@@ -218,7 +218,7 @@ def test_a_record_that_is_spoilt_is_not_asked_for_its_forces():
 
 def test_a_motion_is_missed_where_a_coordinate_is():
     made = case(DT, x=SWING, measured=("x",))
-    assert motion_of(made) == "nobody said what the rig is; name it with --rig"
+    assert motion_of(made) == "the rig is not specified; name it with --rig"
     plant = find("cart-pendulum")
     place = {"x": Place(column="x", y=SWING, resolution=STEP, unit="m")}
     assert motion_of(replace(made, plant=plant, places=place)) == "no column measures theta"

@@ -195,12 +195,12 @@ def test_a_data_sheet_is_taken_by_name_and_told(tmp_path):
 def test_a_data_sheet_says_what_the_make_s_own_rig_is():
     for make in MAKES.values():
         assert make.vendor in VENDORS
-        rig, said = make_rig(make.key), sheet(make.vendor, make.plant)
+        rig, said = make_rig(make.key), sheet(make.vendor, make.rig.plant)
         assert (said["limit"].value, said["servo_period"].value) == (rig.limit, rig.period)
         assert (said["delay"].value, said["lag"].value, said["converter"].value) == (rig.delay, rig.lag, CONVERTER)
-    assert "counts.x" not in sheet("ECP 205", MAKES["linear"].plant)  # it has no cart
-    assert "limit" not in sheet("ECP 210", MAKES["linear"].plant, unit="N")  # its limit is in V
-    assert sheet("ECP 210", MAKES["linear"].plant)["counts.x"].value == PER_METRE
+    assert "counts.x" not in sheet("ECP 205", MAKES["linear"].rig.plant)  # it has no cart
+    assert "limit" not in sheet("ECP 210", MAKES["linear"].rig.plant, unit="N")  # its limit is in V
+    assert sheet("ECP 210", MAKES["linear"].rig.plant)["counts.x"].value == PER_METRE
 
 
 def fit_of(seed: int, folder: Path) -> Path:

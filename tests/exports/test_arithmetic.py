@@ -88,7 +88,7 @@ def test_a_program_says_what_its_reader_has_to_know():
     ]
     bare = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[-3.0]], period=0.1)
     told = SampledController(law=bare, readings=("x",), commands=("u",), reading_units=("",), delay=1.5).facts
-    assert told[-2] == "Commands: u; NO LIMIT WAS SAID, not rounded."
+    assert told[-2] == "Commands: u; NO LIMIT SPECIFIED, not rounded."
     assert told[-1] == "Designed for commands that act 1.5 samples late in all."
     assert replace(MADE, delay=0.0).facts[-1] == "Designed for commands that act 0 samples late in all."
     assert not any("late in all" in line for line in MADE.facts)

@@ -117,7 +117,7 @@ def test_interrupt_keeps_the_best_so_far() -> None:
 def test_nothing_to_fit_is_said_in_a_sentence() -> None:
     with pytest.raises(BadInput, match="role 'fit'"):
         identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3}), [swing(role="predict")])
-    with pytest.raises(BadInput, match="nothing is asked"):
+    with pytest.raises(BadInput, match="no parameter is to be estimated"):
         identify(rig(Pendulum, PENDULUM, {}), [swing()])
     with pytest.raises(BadInput, match="least-squares"):
         identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3}), [swing()], method="least-square")

@@ -79,7 +79,7 @@ def test_a_question_is_said_to_be_raised_lowered_or_unchanged():
     assert said[0] == page.verdict == f"loops: raised by 1.4 ({span}), more than chance explains."
     assert said[1] == f"bode: lowered by 1.4 ({back}), more than chance explains."
     assert said[2].startswith("same: unchanged on average (")
-    assert said[2].endswith("not to be told from chance once all questions asked are counted.")
+    assert said[2].endswith("not distinguishable from chance once all questions are counted.")
     assert (
         said[3] == "alike: raised by 1.0 (1.00 to 1.00), the same for everybody, so there is no spread to test against."
     )
@@ -104,7 +104,7 @@ def test_a_gain_that_chance_explains_once_all_are_counted_is_not_claimed():
     assert 0.025 < p < 0.05
     assert "more than chance" in told(ratings(items[0])).verdict
     page = told(ratings(*items))
-    assert "not to be told from chance" in page.verdict
+    assert "not distinguishable from chance" in page.verdict
     assert table(page, "Ratings").rows[0][7:9] == (f"{p:.2g}", f"{3 * p:.2g}")
 
 
@@ -313,12 +313,12 @@ def test_means_that_fit_fewer_answers_are_asked_again_of_these():
 @pytest.mark.parametrize(
     ("rows", "sure", "rest"),
     [
-        ([("1.0", "4.0")], "1 of 1", "0 cannot be told from the means alone."),
+        ([("1.0", "4.0")], "1 of 1", "0 are not decided by the means alone."),
         ([("2.0", "2.0")], "0 of 1", "1 is not significant, however they were."),
         (
             [("2.0", "2.0"), ("3.0", "3.0"), ("2.0", "2.8")],
             "0 of 3",
-            "2 are not significant, however they were; 1 cannot be told from the means alone.",
+            "2 are not significant, however they were; 1 are not decided by the means alone.",
         ),
     ],
 )

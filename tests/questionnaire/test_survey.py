@@ -210,8 +210,8 @@ def test_encodings_and_declared_delimiters_of_excel_are_read(tmp_path, encoding)
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("id,a pre,a post\n1,2,5\n2,3,3\n", "line 2, 'a post': a whole rating from 1 to 4 was needed, got 5"),
-        ("id,a pre,a post\n1,2,2.5\n", "whole rating"),
+        ("id,a pre,a post\n1,2,5\n2,3,3\n", "line 2, 'a post': a rating from 1 to 4 was needed, got 5"),
+        ("id,a pre,a post\n1,2,4.5\n", "a rating from 1 to 4"),
         ("id,a pre,a post\n1,2,often\n", "got 'often'"),
         ("id,a pre,a post\n1,2,3\n1,2,3\n", "line 2 and again in line 3"),
         ("id,a pre\n1,2\n", "none for the other time"),
@@ -275,5 +275,5 @@ def test_each_printed_change_has_one_verdict_and_its_gain(tmp_path):
     assert found["more"]["t"][1] == pytest.approx(4.0, rel=1e-12)
     assert told.verdict == (
         "1 of 3 changes are significant at 5 % however the single answers were paired and spread; 1 is not significant,"
-        " however they were; 1 cannot be told from the means alone."
+        " however they were; 1 are not decided by the means alone."
     )

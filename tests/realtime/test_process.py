@@ -116,8 +116,11 @@ def test_a_wish_stops_it(tmp_path):
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_a_loop_that_is_killed_leaves_its_rows_and_a_sentence(tmp_path):
+    seen = []
+
     def kill(state):
         if state.phase == "running" and state.tick > 1700:
+            seen.append(state)
             for child in multiprocessing.active_children():
                 if child.name == "upright loop":
                     os.kill(child.pid, signal.SIGKILL)
@@ -125,6 +128,9 @@ def test_a_loop_that_is_killed_leaves_its_rows_and_a_sentence(tmp_path):
 
     end = run_in_process(order(tmp_path, seconds=60.0), watch=kill)
     assert "killed" in end.stopped
+    # of the loop: not of the board, which was on before, nor of the wait for a person
+    assert float(end.stopped.split(") ")[1].split(" s")[0]) == pytest.approx(end.ticks * RIG.period, rel=0.01)
+    assert 1700 < end.ticks < seen[0].tick + 2000
     # the twin died with the process that moved it; a board's own watchdog is tested by the conformance suite
     log = tmp_path / "run.mcap"
     assert until(lambda: log.exists() and len(read_log(log)) > 300)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from dataclasses import replace
 from functools import partial
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.realtime.rigs import LAW, RIG, staged
-from upright.errors import BadInput
+from upright.errors import BadInput, RigStopped
 from upright.laws import as_values
 from upright.logs import read_log
 from upright.realtime.pace import Virtual
@@ -113,7 +114,7 @@ def test_samples_that_a_pacing_rig_lost_are_late_ticks(tmp_path):
 def test_a_rig_that_nobody_brings_to_its_start_is_given_up_after_the_patience(tmp_path, monkeypatch):
     monkeypatch.setattr("upright.realtime.session.PATIENCE", 0.5)
     end, shown, log = run_of(tmp_path, stage=lambda: replace(staged(TwinPort(RIG)), bring=lambda: None, advice="lift"))
-    assert "Nobody brought it where it is to be held within 0.5 s" in end.stopped
+    assert "It was not brought where it is to be stabilised within 0.5 s" in end.stopped
     assert log is None
     assert end.ticks == 0
     assert PATIENCE == 120.0
@@ -169,3 +170,57 @@ def test_a_run_that_has_not_begun_has_done_nothing():
     end = refused(BadInput("no rig here."))
     assert (end.ticks, end.late, end.rows, end.dropped, end.seconds) == (0, 0, 0, 0, 0.0)
     assert end.stopped == "no rig here."
+
+
+def test_a_wire_that_is_cut_is_a_fault_of_the_link(tmp_path):
+    class Cut(TwinPort):
+        """It answers for 2.6 s, then nobody does."""
+
+        left = 3000
+
+        def advance(self):
+            self.left -= 1
+            if self.left < 0:
+                raise RigStopped("The rig did not answer for 1 s.")
+            return super().advance()
+
+    port = Cut(RIG)
+    end, _, _ = run_of(tmp_path, port=port, seconds=60.0)
+    assert end.stopped == "The rig did not answer for 1 s."
+    assert end.faults == Fault.LINK
+    assert end.ticks > 100
+    assert not port._enabled
+    assert port._command == 0.0
+
+
+def test_the_state_of_a_run_counts_from_its_first_tick(tmp_path):
+    _, states, _ = run_of(tmp_path, seconds=0.5)
+    running = [s for s in states if s.phase == "running"]
+    assert [s.tick for s in running] == list(range(1, len(running) + 1))
+    assert [s.time for s in running] == pytest.approx([k * RIG.period for k in range(1, len(running) + 1)])
+
+
+def test_a_second_interrupt_while_the_rig_is_zeroed_does_not_lose_the_end(tmp_path):
+    class Impatient(TwinPort):
+        """Somebody presses Ctrl-C twice: in the loop, and while the power stage is switched off for it."""
+
+        pressed = 0
+
+        def advance(self):
+            if self._enabled and self._periods > 2000 and not self.pressed:
+                self.pressed = 1
+                signal.raise_signal(signal.SIGINT)
+            return super().advance()
+
+        def enable(self, on):
+            super().enable(on)
+            if self.pressed == 1 and not on:
+                self.pressed = 2
+                signal.raise_signal(signal.SIGINT)
+
+    port = Impatient(RIG)
+    end, _, _ = run_of(tmp_path, port=port, seconds=60.0)
+    assert port.pressed == 2
+    assert "Ctrl-C" in end.stopped
+    assert end.log_message == ""
+    assert end.rows > 100

@@ -247,7 +247,7 @@ def test_poles_of_least_cost_are_drawn_in_the_upper_half_with_those_that_were_ch
     sets = {"set 1": np.array([-4 + 2j, -4 - 2j]), "set 2": np.array([-6.0 + 0j, -5.0])}
     (axes,) = locus_figure(tracks, sets, np.array([4.0 + 0j, -2 + 1j, -2 - 1j]), origin="open loop, recovered").axes
     assert points(axes) == {
-        "poles of least cost as effort gets cheaper": [(-2, 3), (-1, 1)], "open loop, recovered": [(-2, 1), (4, 0)],
+        "LQR poles as effort gets cheaper": [(-2, 3), (-1, 1)], "open loop, recovered": [(-2, 1), (4, 0)],
         "set 1": [(-4, 2)], "set 2": [(-6, 0), (-5, 0)],
     }  # fmt: skip
     marks = {line.get_label(): line.get_marker() for line in axes.lines}

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.rig.makes import MAKES, MOTOR_AND_BELT, OSCILLATORS, BrassPendulum, make_rig
+from upright.rig.brass import BrassPendulum
+from upright.rig.makes import BODIES, MAKES, MOTOR_AND_BELT, make_rig
 
 
 @pytest.mark.parametrize("make", ["linear", "furuta"])
@@ -64,30 +65,31 @@ def own_inertia(radius, mass=0.5, at=0.025):
 
 def test_what_the_bench_weighs_and_mounts_is_the_disk_of_the_later_experiments():
     """Disk of 2.5e-3 kg m^2 with motor and belt, two masses of 500 g at 6 cm, and the arm, make the pendulum's disk."""
-    bench = OSCILLATORS["torsional"].plant.J_1
+    bench = BODIES["torsional"].rig.plant.J_1
     assert bench == pytest.approx(2.5e-3 + MOTOR_AND_BELT)
     for make, radius in (("furuta", 0.060), ("torsional", 0.065)):
         mounted = MAKES[make].mounted
         assert mounted.each == pytest.approx(own_inertia(radius))
         whole = bench + 2 * own_inertia(radius) + mounted.rest
         # designed, not weighed: the modes of the paper's tables decided within some percent
-        assert getattr(MAKES[make].plant, MAKES[make].body) == pytest.approx(whole, rel=0.05)
+        assert getattr(MAKES[make].rig.plant, MAKES[make].body) == pytest.approx(whole, rel=0.05)
         assert mounted.pieces == 2
 
 
 def test_a_cart_on_the_bench_swings_between_two_springs():
-    cart = OSCILLATORS["rectilinear"].plant
+    cart = BODIES["rectilinear"].rig.plant
     assert cart.k_1 == pytest.approx(2 * 195.0)
-    assert OSCILLATORS["rectilinear"].piece == MAKES["rectilinear"].mounted.each == 0.5
+    assert BODIES["rectilinear"].piece == MAKES["rectilinear"].mounted.each == 0.5
 
 
-@pytest.mark.parametrize("kind", OSCILLATORS)
+@pytest.mark.parametrize("kind", BODIES)
 def test_a_step_moves_the_body_on_the_bench_well_beyond_its_friction(kind):
     """Its mode of 500 g more or less lies where a person can count swings, and friction takes a fifth at most."""
-    o = OSCILLATORS[kind]
-    k, inertia = (o.plant.k_1, o.plant.m_1) if kind == "rectilinear" else (o.plant.k_1, o.plant.J_1)
+    o = BODIES[kind]
+    plant, drive = o.rig.plant, o.rig
+    k, inertia = plant.k_1, plant.m_1 if kind == "rectilinear" else plant.J_1
     assert 0.3 < np.sqrt(k / inertia) / (2 * np.pi) < 10
-    friction = o.plant.f_1c
-    assert friction < 0.2 * o.gain * o.step
-    assert o.step <= o.limit
-    assert o.gain * o.step / k * o.counts > 100  # counts
+    friction = plant.f_1c
+    assert friction < 0.2 * drive.gain * o.step
+    assert o.step <= drive.limit
+    assert drive.gain * o.step / k * drive.per_unit[0] > 100  # counts

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.hazards import sound
 from benchmarks.measure import Unavailable
 from benchmarks.safety import HAZARDS, judged
 
@@ -38,12 +37,3 @@ def test_a_hazard_is_stopped_in_time(column, hazard):
     except Unavailable as why:
         pytest.skip(str(why))
     assert line.reached is not False, line.note
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", sound.KINDS)
-@pytest.mark.parametrize("make", sound.MAKES)
-def test_what_asks_command_and_pendulum_leaves_sound_loops_alone(make, kind):
-    """Seeds that the benchmark does not have."""
-    found = sound.all_of(make, kind, range(101, 104))
-    assert (found.still, found.scale) == (0, 0)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from upright.control.sensors import Watch
+from upright.control.watch import Watch
 from upright.rig.makes import make_rig
 from upright.rigs import Mode
 from upright.running.tick import supervised

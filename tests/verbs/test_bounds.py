@@ -34,7 +34,7 @@ def test_a_design_of_matrices_takes_period_limit_and_start_as_they_are_typed():
     ("options", "said"),
     [
         ({"period": ""}, "these matrices are continuous, and a computer closes the loop"),
-        ({"model": TOWER.to_sampled(0.02), "period": "21 ms"}, "every 20 ms, and a period of 21 ms was asked for"),
+        ({"model": TOWER.to_sampled(0.02), "period": "21 ms"}, "every 20 ms, and a period of 21 ms is requested"),
         ({"at": "inverted"}, "are of a rig"), ({"counts": 4096}, "are of a rig"),
         ({"vendor": "ECP 210"}, "are of a rig"),
         ({"start": "x=0 mm"}, "must leave the equilibrium"), ({"start": "y=1"}, "names states as in"),
@@ -99,7 +99,7 @@ def elsewhere(tmp_path, monkeypatch):
         (lambda: up.regulate(which=0), "--set is 1 to 4, or all, got '0'"),
         (lambda: up.regulate(which="set 1"), "--set is 1 to 4, or all, got 'set 1'"),
         (lambda: up.regulate(which="all", poles=[-1, -2, -3, -4]), "give either --set"),
-        (lambda: up.regulate(FURUTA, rig="linear"), "is of the make 'furuta', not 'linear'; leave --rig out"),
+        (lambda: up.regulate(FURUTA, rig="linear"), "is a 'furuta', not 'linear'; leave --rig out"),
         (lambda: up.track(limit=0.0), "--limit must be above 0 .*, got 0"),
         (lambda: up.track(step=0.0), "a size above 0, got '0.0'"),
         (lambda: up.track(sets="1,b"), "--set takes numbers of Table 2"), (lambda: up.track(sets=[0]), "sets 1 to 4"),

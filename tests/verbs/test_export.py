@@ -35,7 +35,7 @@ def test_a_law_without_a_limit_is_written_with_a_warning(tmp_path):
     from dataclasses import replace
 
     (warned,) = up.export(replace(LAW, limit=math.inf), to="python", out=tmp_path).chapter.warnings
-    assert warned.startswith("Nobody said how large a command may be")
+    assert warned.startswith("The command's limit is not specified")
 
 
 def test_single_precision_is_said_to_miss_by_as_much_as_it_may(tmp_path):

@@ -31,7 +31,7 @@ def test_a_record_lists_the_range_unit_and_role_of_every_column():
     assert shown.headings == ("column", "unit", "role", "least", "greatest")
     assert shown.rows == (
         ("theta", "rad", "measured", "−2.000", "3.000"), ("V", "V", "drives", "4.000", "5.000"),
-        ("turns", "–", "", "1.000", "7.000"), ("note", "not said", "", "6.000", "6.000"),
+        ("turns", "–", "", "1.000", "7.000"), ("note", "not specified", "", "6.000", "6.000"),
     )  # fmt: skip
     assert shown.caption == "Columns"
     assert [shown.headings[i] for i in shown.numbers] == ["least", "greatest"]

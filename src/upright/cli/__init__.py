@@ -23,10 +23,10 @@ from upright import verbs
 from upright.cli.build import SETTINGS, build
 from upright.cli.sentences import USER_ERROR, only_sentences, sentences
 from upright.errors import BadInput
-from upright.trust import no_code
+from upright.trust import allow_code, no_code
 from upright.verbs.command import Command, command_of
 
-NO_CODE = "--no-code"
+NO_CODE, ALLOW_CODE = "--no-code", "--allow-code"
 SECTIONS = ("Log", "Model", "Control", "Course", "upright rig", "upright log")
 """Of ``upright --help``; what other packages add follows."""
 ELSEWHERE = "upright.commands"
@@ -106,12 +106,12 @@ class Commands(TyperGroup):
         )  # fmt: skip
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take `--no-code` wherever it stands; it is an option of all commands. Without a word, list them."""
+        """Take `--no-code` and `--allow-code` of any command wherever they stand. Without a word, list commands."""
         if not args and not ctx.resilient_parsing:  # Typer shows nothing where rich has no part in the help
             typer.echo(ctx.get_help(), err=True)
             ctx.exit(USER_ERROR)
-        moved = [NO_CODE] if NO_CODE in args else []
-        return super().parse_args(ctx, moved + [word for word in args if word != NO_CODE])
+        moved = [option for option in (NO_CODE, ALLOW_CODE) if option in args]
+        return super().parse_args(ctx, moved + [word for word in args if word not in moved])
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """List the commands in plain text; rich's boxes cost 0.15 s here, where people wait for nothing else."""
@@ -137,7 +137,8 @@ class Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what a person got wrong becomes a sentence and an exit code."""
         only_sentences()
-        with sentences(), no_code(bool(ctx.params.get("no_code"))):
+        refused, allowed = (bool(ctx.params.get(name)) for name in ("no_code", "allow_code"))
+        with sentences(), no_code(refused), allow_code(allowed):
             return super().invoke(ctx)
 
 
@@ -175,6 +176,9 @@ def _upright(
     ] = False,
     no_code: Annotated[
         bool, typer.Option(NO_CODE, help="Refuse to run Python code that a study or a fit.json names as its plant.")
+    ] = False,
+    allow_code: Annotated[
+        bool, typer.Option(ALLOW_CODE, help="Run it without asking; where nobody can answer it is refused otherwise.")
     ] = False,
 ) -> None:
     """From one Lagrangian to a fitted real rig: a log goes in, a trusted nonlinear model comes out."""

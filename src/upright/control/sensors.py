@@ -1,4 +1,4 @@
-"""Scales of encoders that may lie, from the hanging rig before a loop is closed, and a watch beside a running loop.
+"""Scales of encoders that may lie, from the hanging rig before a loop is closed; `watch` looks on beside a running one.
 
 A command that swings the model to about 100 degrees is put out blindly, then the rig coasts. What the encoders show is
 compared with the motion of the model, whose numbers may move as far as they are known: s of ``reading = s motion`` is
@@ -6,13 +6,6 @@ what an encoder shows over what is true. Nothing but physics can fix it: the per
 amplitude (a pendulum at 90 degrees is 18 % slower than at 10), momentum what the driven body does for that swing, and
 the sign of the drive that of both. How the driven body drifts meanwhile says nothing: a rig out of level, a command's
 offset and dry friction all make it.
-
-In the running loop each suspicion, such as "theta shows twice what is true", is a model with a Kalman filter of its
-own. At every sample each filter gives the likelihood of the new reading; the logarithms of the ratios add up and slowly
-fade (Wald's sequential test of several hypotheses, with a memory). Where a suspicion has become `ODDS` times as likely
-as sound sensors, something is wrong. What it is shows a little later, since two sensors seen only beside each other
-cannot tell which of them is wrong: the drive is switched off once one suspicion leads the others, or the pendulum
-leaves `SAFE`, or `PATIENCE` is over.
 """
 
 from __future__ import annotations
@@ -22,17 +15,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from upright.control.bank import TEXT
 from upright.control.swing_up import SwingUp
-from upright.control.trial import SUBSTEPS, Trial, logged, trial
-from upright.gains import process_noise
-from upright.laws import Law
+from upright.control.trial import SUBSTEPS, logged, trial
 from upright.records import Array, Record
 from upright.rig import Rig
 from upright.simulation import simulate
-from upright.simulation.lowering.routine import Routine
 
 SWING = math.radians(100)
 """Angle to which the model is swung [rad]."""
@@ -244,200 +232,3 @@ def lifted(rig: Rig, shown: float) -> str:
         f"The encoder of theta shows {math.degrees(shown):.0f} degrees for half a turn, {abs(shown) / math.pi:.3g} "
         "times what is true; the loop stays open. Correct its counts per turn, or zero it where the pendulum hangs."
     )
-
-
-FACTORS = (-1.0, 0.25, 0.5, 2.0, 4.0)
-"""What a suspected sensor may show over what is true: swapped channels, quadrature counted otherwise. A loop stands
-with ten percent more or less, and so little is found by `sensors`, hanging."""
-ODDS = 3e3
-"""Ratio of likelihoods at which a suspicion is believed."""
-UNKNOWN = 0.1
-"""What the model does not know (dry friction, gain, the ratio of its inertias), as white accelerations of every
-coordinate by itself, in shares of what the drive's limit gives it."""
-NAMED = 100.0
-"""Ratio of likelihoods at which the best suspicion leads the next."""
-PATIENCE = 0.06
-"""How long it may take to find out which [s]."""
-SAFE = math.radians(6)
-"""Deviation [rad] beyond which nobody waits to find out."""
-FORGOTTEN = 0.4
-"""Time constant with which evidence fades [s]: a little that the model always has wrong must not add up for ever."""
-MOVED, WITHIN = 0.04, 0.1
-"""A sample is evidence when a sensor moved, within so many seconds [s], by such a share of what the drive could have
-moved it from rest. Close to rest dry friction, which the filters do not know, holds a pendulum that leans, and rounding
-repeats itself: after two seconds of that, sound sensors looked as if they showed four times what is true."""
-PLAINLY = 3.0
-"""It is evidence too when the mean command of that time is so many times what dry friction takes: something had to
-move, and an encoder that is dead shows that nothing did."""
-SURPRISE = 15.0
-"""Most that one sample counts against a suspicion. What the filters know brings more in one of 1800 (chi-square of two
-readings: exp(-15/2)); a tap, of which they know nothing, brings hundreds, and says nothing of sensors."""
-_SETTLING = 400
-
-
-@dataclass(frozen=True, kw_only=True)
-class Suspicion:
-    """One sensor showing a factor times what is true; no sensor when all are sound."""
-
-    name: str = ""
-    factor: float = 1.0
-
-    def __str__(self) -> str:
-        """As a sentence has it."""
-        if not self.name:
-            return "all sensors sound"
-        way = " the wrong way round" if self.factor == -1 else f" {abs(self.factor):g} times what is true"
-        return f"{self.name} shown{way}"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Alarm:
-    """When a watch spoke, and of what, run by run.
-
-    Attributes
-    ----------
-    sample : array of int, shape (lanes,)
-        Sample at which it switches the drive off; -1 where it has no reason to.
-    what : tuple of Suspicion
-        The suspicion then; sound sensors where it kept still.
-    odds : array, shape (N, lanes)
-        Logarithm of the likelihood of the best suspicion over that of sound sensors.
-    """
-
-    sample: NDArray[np.int64]
-    what: tuple[Suspicion, ...]
-    odds: Array
-
-
-def watched(
-    watch: Watch, rig: Rig, law: Law, *, start: ArrayLike, seconds: float, rest: ArrayLike | None = None
-) -> tuple[Trial, Alarm]:
-    """Run a law on a rig beside a watch that switches the drive off, one sample after it has spoken.
-
-    The run is made twice: until the watch speaks both are the same, sample for sample.
-
-    Parameters
-    ----------
-    watch : Watch
-    rig : Rig
-        As it truly is.
-    law : Law
-    start, seconds, rest
-        As of `trial`.
-    """
-
-    def run(off: float) -> Trial:
-        return trial(rig, law, at=watch.at, start=start, seconds=seconds, rest=rest, off=off)
-
-    free = run(math.inf)
-    readings = np.column_stack([free.record[c.name] for c in rig.plant.coordinates]) - free.rest
-    alarm = watch.over(readings, free.u)
-    k = int(alarm.sample[0])
-    return (free if k < 0 else run((k + 1) * rig.period)), alarm
-
-
-def sticking(model: Rig) -> float:
-    """Command that dry friction of what the drive moves takes, as far as the model knows of it."""
-    on = model.plant.inputs[0].on
-    names = [n for j in model.plant.joints if j.on == on for n in (j.coulomb, j.stiction) if n]
-    return max((float(getattr(model.plant, n)) for n in names), default=0.0) / abs(model.gain)
-
-
-class Watch:
-    """Bank of Kalman filters about an equilibrium, for one loop or many lanes of it, fed sample by sample."""
-
-    def __init__(
-        self,
-        model: Rig,
-        at: str = "inverted",
-        *,
-        odds: float = ODDS,
-        unknown: float = UNKNOWN,
-        forgotten: float = FORGOTTEN,
-    ) -> None:
-        names = [c.name for c in model.plant.coordinates]
-        self.model, self.at = model, at
-        self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for f in FACTORS for n in names))
-        linear = model.linear(at)
-        sampled = linear.to_sampled(model.period, (model.delay + model.lag) / model.period)
-        self._A, self._B, n = sampled.A.copy(), sampled.B[:, 0].copy(), sampled.A.shape[0]
-        scales = np.ones((len(self.suspicions), len(names)))
-        for i, s in enumerate(self.suspicions[1:], start=1):
-            scales[i, names.index(s.name)] = s.factor
-        self._C = scales[:, :, None] * sampled.C
-        self._earlier = max(1, round(WITHIN / model.period))
-        self._plain = max(0.005 * model.limit, PLAINLY * sticking(model))
-        self._bound, self._kept = math.log(odds), math.exp(-model.period / forgotten)
-        # in what is shown, all suspicions expect the same disturbance: they are told apart by motions, not by noise
-        driven = model.limit * np.abs(linear.B[1::2, 0])
-        self._moved = MOVED * driven * WITHIN**2 / 2
-        # rounding repeats itself for as many samples as a count takes at the speeds that are evidence: as one sample
-        repeated = np.maximum(1.0, model.resolution / (self._moved / WITHIN * model.period))
-        noise = repeated * model.resolution**2 / 12
-        shaking = unknown * driven / np.abs(scales)
-        W = np.array([process_noise(sampled, a) for a in shaking])
-        # the start is known to a rad or m, and at rest to a rad/s or m/s; commands on their way are known
-        P = np.zeros((len(scales), n, n))
-        P[:, range(4), range(4)] = np.repeat(scales, 2, axis=1) ** -2.0
-        gains: list[Array] = []
-        weights: list[Array] = []
-        sizes: list[Array] = []
-        for _ in range(_SETTLING):  # covariances depend on no reading
-            CP = self._C @ P
-            S = CP @ self._C.transpose(0, 2, 1) + np.diag(noise)
-            L = np.linalg.solve(S, CP).transpose(0, 2, 1)
-            gains.append(np.asarray(L, dtype=np.float64))
-            weights.append(np.asarray(np.linalg.inv(S), dtype=np.float64))
-            sizes.append(np.asarray(np.linalg.slogdet(S)[1], dtype=np.float64))
-            P = self._A @ (P - L @ CP) @ self._A.T + W
-            P = 0.5 * (P + P.transpose(0, 2, 1))
-        self.gains, self._weights, self._sizes = np.array(gains), np.array(weights), np.array(sizes)
-        self._begin(1)
-
-    def _begin(self, lanes: int) -> None:
-        """Forget all that was seen."""
-        filters, coordinates, states = self._C.shape
-        whole, patience = np.int64, PATIENCE / self.model.period
-        numbers = np.array([self._plain, self._bound, self._kept, SURPRISE, math.log(NAMED), SAFE, patience])
-        self._y, self._u = np.zeros((lanes, coordinates)), np.zeros(lanes)
-        self.likelihood: Array = np.zeros((lanes, filters))
-        self._odds, self._says, self._best = np.zeros(lanes), np.zeros(lanes, whole), np.zeros(lanes, whole)
-        self._sample = Routine(
-            TEXT, "see", np.zeros(1, whole), self._y, self._u, self._C, self._A, self._B, self.gains, self._weights,
-            self._sizes, self._moved, numbers, np.zeros((lanes, filters, states)),
-            np.zeros((self._earlier + 1, lanes, coordinates)), np.zeros((self._earlier, lanes)), self.likelihood,
-            np.full(lanes, -1, whole), np.zeros(coordinates + states), self._odds, self._says, self._best,
-        )  # fmt: skip
-
-    def see(self, reading: Array | Sequence[Sequence[float]], command: ArrayLike) -> Array:
-        """Take one reading, shape (lanes, coordinates), as deviation from rest, and the command put out after it.
-
-        Returns
-        -------
-        array, shape (lanes,)
-            Logarithm of the odds of the best suspicion.
-        """
-        if len(reading) != len(self._y):
-            self._begin(len(reading))
-        self._y[:], self._u[:] = reading, command
-        self._sample()
-        return self._odds.copy()
-
-    def speaks(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Whether the drive is to be switched off after the last reading, and for which suspicion, lane by lane."""
-        return self._says > 0, self._best.copy()
-
-    def over(self, readings: Array, commands: Array) -> Alarm:
-        """Watch whole runs: deviations from rest, shape (N, coordinates[, lanes]), and commands, shape (N[, lanes])."""
-        y = readings[:, :, None] if readings.ndim == 2 else readings
-        u = commands[:, None] if commands.ndim == 1 else commands
-        lanes = y.shape[2]
-        sample, which = np.full(lanes, -1, dtype=np.int64), np.zeros(lanes, dtype=np.int64)
-        odds = np.empty((len(y), lanes))
-        self._begin(lanes)
-        for k in range(len(y)):
-            odds[k] = self.see(y[k].T, u[k])
-            alarm, best = self.speaks()
-            now = (sample < 0) & alarm
-            sample[now], which[now] = k, best[now]
-        return Alarm(sample=sample, what=tuple(self.suspicions[i] for i in which.tolist()), odds=odds)

@@ -26,18 +26,16 @@ from upright.systems import StateSpace, to_s
 def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = ".") -> Chapter:
     """What a design says; fit or study and the folder of its files are named as they were typed."""
     poles = "with poles " if design.request.proposed is None else "with proposed poles "
-    aim = poles + written(design.request.poles) if design.request.poles is not None else "of least cost"
+    aim = poles + written(design.request.poles) if design.request.poles is not None else "by LQR"
     gains: list[str] = []
     if design.request.proposed is not None:
         gains.append(
-            f"Nobody asked for poles. These are proposed: {design.request.proposed:g} times as fast as the model "
+            f"No poles were requested. These are proposed: {design.request.proposed:g} times as fast as the model "
             "falls or swings by itself, the quietest of those whose loop keeps nearly the largest distance to -1. Ask "
             "for others with --poles or --lqr."
         )
     if design.placement is not None:
-        gains.append(
-            f"Farthest pole from where it was asked: {design.placement.miss:.1g} 1/s. {design.placement.sentence}"
-        )
+        gains.append(f"Largest miss of a requested pole: {design.placement.miss:.1g} 1/s. {design.placement.sentence}")
     if design.R is not None:
         gains.append(f"Weight of the effort: {number(design.R)}.")
     sure: list[Block] = []
@@ -77,7 +75,7 @@ def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = "."
 def _delay_from(design: Designed) -> str:
     """Who says how late a command acts."""
     if design.request.delay is not None:
-        return "as asked"
+        return "as requested"
     if isinstance(design.rig, StateSpace):
         return "besides what the matrices hold" if design.rig.dt else "assumed"
     return "as the file says" if design.rig.delay else "assumed"
@@ -95,7 +93,7 @@ def _doubts(design: Designed) -> tuple[str, ...]:
         return stated
     return (
         *stated,
-        "Nobody said how large a command the drive takes, so whether it saturates is not known: --limit 10, or "
+        "The drive's limit is not specified, so saturation is not predicted: --limit 10, or "
         '[actuator] limit = "10 V" in the study.',
     )
 
@@ -122,11 +120,11 @@ def _pole_table(design: Designed) -> Table:
     discrete = design.model.dt is not None
     rows = [("model, open loop", _outlasting(design, design.open_loop, 5) if discrete else written(design.open_loop))]
     if design.placement is not None:
-        rows.append(("asked", written(design.placement.requested)))
+        rows.append(("requested", written(design.placement.requested)))
         rows.append((f"attained, {_of_model(design)}", written(design.placement.attained)))
     else:
         least = _outlasting(design, design.wanted, 5) if discrete else written(design.wanted)
-        rows.append((f"least cost, {_of_model(design)}", least))
+        rows.append((f"LQR, {_of_model(design)}", least))
     rows.append(("loop as it runs", _outlasting(design, design.poles, 4)))
     return Table(caption="Poles [1/s]", headings=("", "poles"), rows=tuple(rows))
 
@@ -255,7 +253,7 @@ def _effort(design: Designed) -> str:
             f"{shown(design.holding.effort, design.request.limit or math.inf, design.rig.unit)}."
         )
     return rest + (
-        f" The start asked for takes {number(design.peak_sampled, 3)} {design.rig.unit} at most, "
+        f" The requested start takes {number(design.peak_sampled, 3)} {design.rig.unit} at most, "
         f"{number(design.peak, 3)} {design.rig.unit} by the continuous model."
     )
 
@@ -297,7 +295,7 @@ def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
 
 def _pole_pictures(design: Designed) -> list[Picture]:
     """Poles in the s-plane, and the LQR locus as the effort's weight varies, a hundredfold either way."""
-    aim = "asked" if design.placement else "least cost"
+    aim = "requested" if design.placement else "LQR"
     kinds = [
         Poles(name="model, open loop", values=_drawn(design, design.open_loop), mark="x", colour=BLACK),
         Poles(name=aim, values=_drawn(design, design.wanted), mark="o", colour=BLUE),
@@ -319,7 +317,7 @@ def _pole_pictures(design: Designed) -> list[Picture]:
     cheaper = Picture(
         name="locus",
         draw=lambda: locus_figure(tracks, {"chosen": _drawn(design, design.wanted)}, _drawn(design, design.open_loop)),
-        caption="Poles of least cost as the effort gets cheaper, from a hundred times the weight chosen to a "
+        caption="LQR poles as the effort gets cheaper, from a hundred times the weight chosen to a "
         "hundredth.",
         description=f"Chosen: R = {number(design.R)}, poles {written(design.wanted, 4)}.",
     )  # fmt: skip
@@ -332,6 +330,6 @@ def _swing_picture(design: Designed) -> Picture:
     shown = {name: (y[:, i], unit) for i, (name, unit) in enumerate(units)}
     return Picture(
         name="swing", draw=lambda: swing_figure(t, shown, u[:, 0], design.rig.unit, design.request.limit),
-        caption="Linear model, continuous gains: the way back from the start asked for, and the command it takes.",
+        caption="Linear model, continuous gains: the way back from the requested start, and the command it takes.",
         description=f"The command peaks at {design.peak:.3g} {design.rig.unit}.",
     )  # fmt: skip

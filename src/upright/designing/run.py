@@ -319,7 +319,7 @@ def _gains(model: StateSpace, request: DesignRequest, start: Array) -> tuple[Arr
     weights, R, discrete = request.weights or (1.0,) * A.shape[0], request.R, model.dt is not None
     if R is None and (discrete or request.limit is None):
         other = "" if discrete else " or a limit (--limit)"
-        raise BadInput(f"least cost needs a weight of the effort (--effort-weight){other}; give one.")
+        raise BadInput(f"LQR needs a weight of the effort (--effort-weight){other}; give one.")
     if R is None:
         R = weight_for_effort(A, B, weights, start, request.limit or math.inf, states=model.states)
     return least_cost(A, B, weights, R, sampled=discrete, states=model.states).K, None, R
@@ -330,7 +330,7 @@ def _placed_samples(model: StateSpace, poles: Roots) -> Placement:
     requested, T = conjugate_poles(poles, model.A.shape[0]), model.period
     if np.abs(requested.imag).max() > math.pi / T:
         raise BadInput(
-            f"samples of {1e3 * T:g} ms show nothing faster than {math.pi / T:.4g} rad/s, and a pole was asked at "
+            f"samples of {1e3 * T:g} ms show nothing faster than {math.pi / T:.4g} rad/s, and a pole was requested at "
             f"{written(requested)}; ask for slower ones."
         )
     placement = place((model.A - np.eye(requested.size)) / T, model.B / T, (to_z(requested, T) - 1) / T)

@@ -34,7 +34,7 @@ def chapter(diagnosis: Diagnosis, *, log: Path, rig: str = "", page: bool = True
     return Chapter(
         title=f"What looks wrong with {Path(diagnosis.file).name}",
         verdict="Nothing wrong found." if not wrong else f"{wrong} thing{'s look' if wrong > 1 else ' looks'} wrong.",
-        detail=f"{diagnosis.samples} samples over {diagnosis.duration:.4g} s, rig: {diagnosis.rig or 'not told'}.",
+        detail=f"{diagnosis.samples} samples over {diagnosis.duration:.4g} s, rig: {diagnosis.rig or 'not specified'}.",
         sound=not wrong,
         parts=(
             *(_part(f, f"finding-{i}") for i, f in enumerate(diagnosis.findings, start=1)),
@@ -84,7 +84,7 @@ def _next_steps(diagnosis: Diagnosis, log: Path, rig: str, page: bool) -> list[S
         steps.append(Step("See the pictures.", command))
     if not rig and diagnosis.rigs:
         choice = " or ".join(diagnosis.rigs)
-        sentence = f"Name the rig, so that signs and scales can be told; these columns would suit {choice}."
+        sentence = f"Name the rig, so that signs and scales can be checked; these columns would suit {choice}."
         steps.append(Step(sentence, f"{again} --rig {diagnosis.rigs[0]}"))
     init = f"upright init {typed(log)} -o study.toml"
     return [*steps, Step("Write a study, with the keys named above.", init)]

@@ -84,7 +84,7 @@ def _unchecked(case: Case) -> dict[str, str]:
     elif case.u[0] != 0:
         out["early"] = f"'{case.drive}' acts from the first sample on"
     if case.plant is None:
-        out |= dict.fromkeys(("sign", "scale", "trip"), "nobody said what the rig is; name it with --rig")
+        out |= dict.fromkeys(("sign", "scale", "trip"), "the rig is not specified; name it with --rig")
     return out
 
 

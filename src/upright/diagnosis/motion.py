@@ -60,7 +60,7 @@ class SmoothedMotion:
 def motion_of(case: Case) -> SmoothedMotion | str:
     """Motion of a record, or the reason why there is none."""
     if case.plant is None:
-        return "nobody said what the rig is; name it with --rig"
+        return "the rig is not specified; name it with --rig"
     coordinates = [c.name for c in case.plant.coordinates]
     missing = [c for c in coordinates if c not in case.places and c not in case.locked]
     if case.chained and case.rig is None and case.places:

@@ -427,7 +427,7 @@ def next_steps(session: Session) -> tuple[Step, ...]:
             again = f"upright run --rig {typed(rig)} --law {typed(law)} --duration 60"
             steps.append(Step("Run the best law for longer.", again))
         return tuple(steps)
-    steps.append(Step("Take another rig of the same make.", typed_again(session, session.seed + 1)))
+    steps.append(Step("Take another rig of the same model.", typed_again(session, session.seed + 1)))
     other = "linear" if session.make != "linear" else "furuta"
     steps.append(Step("Run the laboratory on another kind of rig.", f"upright lab --rig {other}"))
     steps.append(Step("Start on a log of your own.", "upright init LOG"))

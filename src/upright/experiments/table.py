@@ -181,7 +181,7 @@ def _carries_pendulum(stand: TestStand) -> bool:
 
 
 def _is_shaft(stand: TestStand) -> bool:
-    return any(isinstance(stand.rig.plant, type(MAKES[key].plant)) for key in SHAFTS)
+    return any(isinstance(stand.rig.plant, type(MAKES[key].rig.plant)) for key in SHAFTS)
 
 
 EXPERIMENTS: tuple[Experiment, ...] = (

@@ -98,7 +98,7 @@ class SampledController:
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
             *filter(None, [self._zeroing()]),
             f"Commands: {', '.join(self.commands)}{unit}; "
-            + (f"none beyond {self.law.limit!r}" if math.isfinite(self.law.limit) else "NO LIMIT WAS SAID")
+            + (f"none beyond {self.law.limit!r}" if math.isfinite(self.law.limit) else "NO LIMIT SPECIFIED")
             + (f", in steps of {self.converter.max():g}." if self.converter.any() else ", not rounded."),
         ]
         if self.references:

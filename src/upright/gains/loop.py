@@ -94,7 +94,7 @@ def place_sampled(model: StateSpace, estimator: Estimator, poles: ArrayLike) -> 
         size_of = np.abs(matrix).max(axis=1, keepdims=True)
         K = np.linalg.solve(matrix / size_of, goals / size_of[:, 0])
     except np.linalg.LinAlgError:
-        raise BadInput("no gains put the sampled loop's poles there: a mode is out of reach, or a pole is asked where "
+        raise BadInput("no gains put the sampled loop's poles there: a mode is out of reach, or a pole is to be where "
                        "the model has one already; ask for others.") from None  # fmt: skip
     return K[None]
 

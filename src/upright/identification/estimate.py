@@ -35,7 +35,7 @@ from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
-from upright.identification.problem.trips import unasked_trips, with_trip_guesses
+from upright.identification.problem.trips import Moments, unasked_trips, with_trip_guesses
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
 from upright.identification.search.strategy import (
     ATTEMPTS,
@@ -109,15 +109,16 @@ def identify(
 
 def _identify(
     rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
-    conventions: Callable[[], Sequence[str]] | None = None,
+    conventions: Callable[[], Sequence[str]] | None = None, moments: Moments | None = None,
 ) -> Fit:  # fmt: skip
-    """As `identify`; a fit without outliers knows the `conventions` of all samples."""
+    """As `identify`; a fit without outliers knows `conventions` and `moments` of all samples."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
-    fitted = [with_trip_guesses(rig, run) for run in runs if run.role == "fit"]
+    moments = moments or Moments(rig)
+    fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
     log = SearchLog(progress=progress, conventions=conventions or cache(lambda: wrong_conventions(rig, fitted)))
-    log.warnings += unasked_trips(rig, fitted)
+    log.warnings += unasked_trips(rig, fitted, moments)
     try:
         problem, optimum = find_optimum(rig, fitted, method, log, near)
     except KeyboardInterrupt:
@@ -141,7 +142,9 @@ def _identify(
             return fit
         fit = refit_without_outliers(
             fit, rig, runs,
-            lambda left: _identify(rig, left, method, progress, watch=False, near=fit, conventions=log.conventions),
+            lambda left: _identify(
+                rig, left, method, progress, watch=False, near=fit, conventions=log.conventions, moments=moments
+            ),
         )  # fmt: skip
         explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
         return fit if explained or log.conventions() else with_proposal(fit, fitted)
@@ -207,7 +210,7 @@ def _check(rig: GreyBox, runs: Sequence[Run], method: str) -> None:
     if not runs:
         raise BadInput("an identification needs at least one run with role 'fit', none came; set it for one run.")
     if not rig.estimated:
-        raise BadInput("nothing is asked: no parameter is to be estimated; give at least one a guess.")
+        raise BadInput("no parameter is to be estimated; give at least one a guess.")
     for run in runs:
         if run.t.size < 10:
             raise BadInput(f"run '{run.label}' has {run.t.size} samples, at least 10 are needed; widen its window.")

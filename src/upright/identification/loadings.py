@@ -215,7 +215,9 @@ def _damping(loaded: Sequence[Loaded], k: Estimate) -> Estimate:
 
 def _verdict(levels: int, dof: int, chi: float, k: Estimate, bare: Estimate) -> str:
     if bare.interval[0] <= 0:
-        return "The bare body's inertia cannot be told from nothing: its interval reaches zero. Add less, or repeat."
+        return (
+            "The bare body's inertia cannot be distinguished from zero: its interval reaches zero. Add less, or repeat."
+        )
     if levels == 2:
         return "Two loadings fix a line but cannot show that it is one; a third would."
     from scipy.stats import chi2

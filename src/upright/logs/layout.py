@@ -48,7 +48,7 @@ def row_schema(header: LogHeader) -> bytes:
     """
     notes = {
         "mode": _numbered(header.modes, "one of"), "faults": _numbered(header.faults, "sum of"),
-        f"{header.command}_applied": "what the converter really put out", header.command: "what the law asked for",
+        f"{header.command}_applied": "what the converter really put out", header.command: "what the law requested",
         **{name: "what the law followed" for name, _ in header.references},
     }  # fmt: skip
     fields = {

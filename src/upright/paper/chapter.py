@@ -72,7 +72,7 @@ def _facts(result: Reproduced) -> tuple[list[str], list[str], list[str]]:
         f"Recovered plant: a(s) = s² (s² − {number(-first.locus.a[2], 6)}), undamped, unstable pole "
         f"{number(omega, 5)} rad/s. N(w)/R of set 1, w = s²: {_polynomial(first.locus)}.",
         "From set to set R falls by the factor " + " and ".join(number(r, 5) for r in first.ratios)
-        + " (sets 1 to 3, 2 to 4; told by the sets' differences alone): it was halved.",
+        + " (sets 1 to 3, 2 to 4; from the sets' differences alone): it was halved.",
     ]  # fmt: skip
     if result.weights:
         least, most = min(result.weights), max(result.weights)
@@ -123,7 +123,7 @@ def chapter(result: Reproduced) -> Chapter:
     """The tables again, and the errata."""
     one, two, three = _facts(result)
     kinds = [
-        Poles(name="asked, Table 1, set 1", values=result.printed_poles, mark="o", colour=BLUE),
+        Poles(name="requested, Table 1, set 1", values=result.printed_poles, mark="o", colour=BLUE),
         Poles(name="attained, eq. (2) as printed", values=result.missed, mark="x", colour=VERMILLION),
         Poles(name="open loop", values=np.array([result.unstable[1]], dtype=np.complex128), mark="+", colour=BLACK),
     ]
@@ -143,7 +143,7 @@ def chapter(result: Reproduced) -> Chapter:
         verdict=result.verdict,
         sound=max(t.worst for t in result.tables) <= 1 and all(e.shown for e in result.errata),
         question="Do the printed poles follow from one plant and one set of weights each, and which printed formulas "
-        "contradict the energies? p(s) p(−s) = a(s) a(−s) + N(s)/R holds for poles of least cost.",
+        "contradict the energies? p(s) p(−s) = a(s) a(−s) + N(s)/R holds for LQR poles.",
         parts=(
             *(
                 Part(f"Table {i}", (Points(tuple(facts)), _set_table(t), _locus_picture(t, f"t{i}")))
@@ -157,7 +157,7 @@ def chapter(result: Reproduced) -> Chapter:
                 'upright design OUT/fit.json --at inverted --poles "-4.1484+-1.6341j, -16.8545, -3.222"',
             ),
             Step(
-                "Find weights instead of poles: least cost up to the drive's limit.",
+                "Find weights instead of poles: LQR up to the drive's limit.",
                 "upright design OUT/fit.json --at inverted --lqr 1,0,1,0 --limit LIMIT",
             ),
         ),

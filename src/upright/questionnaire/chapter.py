@@ -105,7 +105,7 @@ def _ratings(sheet: Ratings, scale: tuple[int, int]) -> _Evaluated:
         + (
             "more than chance explains."
             if q < 0.05
-            else "not to be told from chance once all questions asked are counted."
+            else "not distinguishable from chance once all questions are counted."
             if not math.isnan(q)
             else "the same for everybody, so there is no spread to test against."
         )
@@ -237,7 +237,7 @@ def _rest(changes: Sequence[tuple[str, str, str, Bound]]) -> str:
     never, open_ones = _verdicts(changes, "not significant"), _verdicts(changes, "open")
     sentences = [f"{never} {'is' if never == 1 else 'are'} not significant, however they were"] if never else []
     if open_ones or not never:
-        sentences.append(f"{open_ones} cannot be told from the means alone")
+        sentences.append(f"{open_ones} are not decided by the means alone")
     return "; ".join(sentences)
 
 

@@ -12,13 +12,13 @@ import os
 import pickle
 import sys
 import traceback
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import of_values
+from upright.realtime.interrupts import no_interrupt
 from upright.realtime.pace import Pace, Virtual, WallClock
 from upright.realtime.priority import step_forward
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
@@ -96,7 +96,7 @@ def run_in_process(
     child = context.Process(
         target=_child, args=(os.getpid(), order, memory, phase, stop, theirs, paced), name="upright loop"
     )
-    with _no_interrupt_for_the_child():
+    with no_interrupt():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
         child.start()
     theirs.close()
     window = _Window(memory, phase)
@@ -108,15 +108,17 @@ def run_in_process(
     except EOFError:
         answer = None
     except KeyboardInterrupt:
-        stop.value = 1
-        answer = ours.recv() if ours.poll(10.0) else None
+        with no_interrupt():  # a second one must not lose the verdict
+            stop.value = 1
+            answer = _last(ours)
     finally:
-        stop.value = 1
-        child.join(10.0)
-        if child.is_alive():
-            child.kill()
-            child.join()
-        ours.close()
+        with no_interrupt():
+            stop.value = 1
+            child.join(10.0)
+            if child.is_alive():
+                child.kill()
+                child.join()
+            ours.close()
     if isinstance(answer, UprightError):
         raise answer
     if isinstance(answer, RunEnd):
@@ -132,25 +134,17 @@ def run_in_process(
     )  # fmt: skip
 
 
+def _last(pipe: Connection) -> Any:
+    """The child's answer once it was told to stop; None when it dies without one."""
+    try:
+        return pipe.recv() if pipe.poll(10.0) else None
+    except EOFError:
+        return None
+
+
 def _ask(stop: Any, watch: Callable[[RunState], str], window: _Window) -> None:
     if watch(window.get()):
         stop.value = 1
-
-
-@contextmanager
-def _no_interrupt_for_the_child() -> Generator[None]:
-    """Ctrl-C reaches a whole group of processes; the child is stopped by its flag, and ignores the signal."""
-    import signal
-    import threading
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _child(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 from upright.errors import RigStopped, UprightError
 from upright.laws import Law, Rule, as_values
 from upright.logs import LogHeader, LogWriter
+from upright.realtime.interrupts import no_interrupt
 from upright.realtime.pace import Pace, Virtual
 from upright.rigs.board import SENTENCES, fault_text
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, Tick
@@ -77,7 +78,7 @@ class RunOrder:
 
 @dataclass(frozen=True, kw_only=True)
 class RunState:
-    """How a run goes; ``readings`` are deviations from what is held."""
+    """How a run goes; time and ticks since its loop began, ``readings`` as deviations from what is held."""
 
     phase: str
     time: float = 0.0
@@ -191,6 +192,8 @@ def carry_out(
             hear.log.event(*event)
         ticking, warning = pace(about)
         end["warning"] = warning
+        if about.paced and not about.virtual:
+            beside.clock = clock.monotonic
         beside.start(order.mode)
         stage.let_go()
         _loop(order, beside, ticking, hear.log, show, end)
@@ -199,16 +202,18 @@ def carry_out(
     except RigStopped as stop:
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
-        end["stopped"] = "Stopped by Ctrl-C or a signal."
-        with suppress(RigStopped):
-            beside.give_up(Fault.STOP, end["stopped"])
+        with no_interrupt():
+            end["stopped"] = "Stopped by Ctrl-C or a signal."
+            with suppress(RigStopped):
+                beside.give_up(Fault.STOP, end["stopped"])
     finally:
-        if not finished:
-            beside.rig.estop()
-        beside.rig.close()
-        if hear.log is not None:
-            status = hear.log.close()
-            end |= {"rows": status.rows, "dropped": status.dropped, "log_message": status.message}
+        with no_interrupt():
+            if not finished:
+                beside.rig.estop()
+            beside.rig.close()
+            if hear.log is not None:
+                status = hear.log.close()
+                end |= {"rows": status.rows, "dropped": status.dropped, "log_message": status.message}
     return RunEnd(faults=beside.faults, events=tuple(hear.events), **end)
 
 
@@ -217,23 +222,33 @@ def _loop(
     end: dict[str, Any],
 ) -> None:  # fmt: skip
     """The only loop: answer a sample, wait for the deadline, hand over the answer and take the next sample."""
-    rig, about, began = beside.rig, beside.about, clock.monotonic()
-    tick = rig.exchange(0.0)
+    about, began = beside.about, clock.monotonic()
+    first = tick = _exchanged(beside, 0.0)
     try:
         for _ in range(max(1, math.ceil(order.seconds / about.period - 1e-9))):
             command = beside.step(tick)
             pace.wait()
-            following = rig.exchange(command)
+            following = _exchanged(beside, command)
             if not beside.stale:
                 _row(log, beside, tick, following, command, beside.references if order.references else ())
             if about.paced:
                 pace.late += max(0, following.tick - tick.tick - 1)
             end["ticks"], end["late"] = end["ticks"] + 1, pace.late
-            show(_state(beside, following, command, pace.late))
+            show(_state(beside, following, command, first, end))
             tick = following
         beside.step(tick)  # a fault of the last sample is one too
     finally:
         end["seconds"] = clock.monotonic() - began
+
+
+def _exchanged(beside: Supervisor, command: float) -> Tick:
+    """The next sample; a rig that does not answer any more is a fault of its link."""
+    try:
+        return beside.rig.exchange(command)
+    except RigStopped as silent:
+        beside.faults |= Fault.LINK  # whether or not it hears that it is to stop
+        beside.give_up(Fault.LINK, str(silent))
+        raise
 
 
 def _row(
@@ -246,10 +261,11 @@ def _row(
     )  # fmt: skip
 
 
-def _state(beside: Supervisor, tick: Tick, command: float, late: int) -> RunState:
+def _state(beside: Supervisor, tick: Tick, command: float, first: Tick, end: Mapping[str, Any]) -> RunState:
     away = tuple(q - t for q, t in zip(beside.readings(tick), beside.target, strict=True))
     return RunState(
-        phase="running", time=tick.time, tick=tick.tick, late=late, mode=tick.mode, faults=tick.faults,
+        phase="running", time=tick.time - first.time, tick=end["ticks"], late=end["late"], mode=tick.mode,
+        faults=tick.faults,
         command=command, applied=tick.applied, readings=away,
     )  # fmt: skip
 
@@ -275,7 +291,7 @@ def _bring(
         if now.time - there >= QUIET:
             return
         if now.time - first > PATIENCE:
-            beside.give_up(Fault.START, f"nobody brought it where it is to be held within {PATIENCE:g} s.")
+            beside.give_up(Fault.START, f"it was not brought where it is to be stabilised within {PATIENCE:g} s.")
         show(RunState(phase=stage.advice or "waiting", time=now.time, tick=now.tick, mode=now.mode))
 
 

@@ -306,7 +306,7 @@ def locus_figure(tracks: Roots, sets: dict[str, Roots], open_loop: Roots, *, ori
     s_plane(ax)
     for i, track in enumerate(tracks.T):
         upper = track[track.imag >= -1e-9]
-        label = "poles of least cost as effort gets cheaper" if i == 0 else None
+        label = "LQR poles as effort gets cheaper" if i == 0 else None
         ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.5, label=label)
     roots(ax, open_loop[open_loop.imag >= -1e-9], "x", GREY, origin)
     for (name, poles), mark in zip(sets.items(), "osD^", strict=False):

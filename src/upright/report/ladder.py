@@ -83,7 +83,7 @@ def _terms(step: RungResult) -> str:
 def _ceilings(ladder: Ladder) -> tuple[Block, ...]:
     """Every group of repeats and signal, beside what the chosen model predicts of the same runs."""
     if not ladder.repeats:
-        return ("No run repeats another, so nobody can say how much is left to explain.",)
+        return ("No run repeats another, so how much is left to explain is not known.",)
     rows = tuple(
         (
             ", ".join(group.labels), plain(signal), percent(group.ceiling[signal]),

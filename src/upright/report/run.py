@@ -163,7 +163,7 @@ def replayed(log: RunLog, replay: Replay) -> Chapter:
         caption="The logged and the replayed command; their distance.", description=verdict,
     )  # fmt: skip
     return Chapter(
-        title=f"{Path(log.file).name}, its law asked again", verdict=verdict, sound=replay.identical,
+        title=f"{Path(log.file).name}, its law replayed", verdict=verdict, sound=replay.identical,
         parts=(Part("Commands", (Points(tuple(sentences)), drawn)),),
         numbers={
             "identical": replay.identical, "compared": replay.rows.size, "differing": replay.differing,

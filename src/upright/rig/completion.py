@@ -57,7 +57,7 @@ def completed(
         hardware = hardware.with_entries({"delay": late})
     make = make_of_vendor(chosen, rig.plant)
     return replace(
-        rig, hardware=hardware, name=make.name if make else hardware.name or rig.name,
+        rig, hardware=hardware, name=make.rig.name if make else hardware.name or rig.name,
         plant=_with_friction(rig.plant, make), unit=rig.unit or "V",
     )  # fmt: skip
 
@@ -92,10 +92,10 @@ def doubts(known: Rig, run: Rig, truth: Rig | None = None) -> tuple[str, ...]:
     hardware = run.hardware
     sheets = [n for n, e in hardware.entries.items() if e.source.startswith("data sheet")]
     if sheets:
-        out.append(f"From the data sheet of the {hardware.vendor}, not said of this rig: {_list(sheets)}.")
+        out.append(f"From the data sheet of the {hardware.vendor}, not specified for this rig: {_list(sheets)}.")
     make = make_of_vendor(hardware.vendor, known.plant)
     if make is not None and run.plant != known.plant:
-        out.append(f"The fit knows no dry friction; simulations have that of the {make.name} as designed.")
+        out.append(f"The fit knows no dry friction; simulations have that of the {make.rig.name} as designed.")
     assumed = [n for n, e in hardware.entries.items() if e.source.startswith("assumed")]
     if assumed:
         out.append(f"Assumed, not measured: {_list(assumed)}.")
@@ -109,7 +109,7 @@ def _with_friction(plant: Plant, make: Make | None) -> Plant:
     dry = [n for n in ("b_1c", "b_2c") if n in plant.names()]
     if make is None or not dry or any(getattr(plant, n) for n in dry):
         return plant
-    return plant.replace(**{n: getattr(make.plant, n) for n in dry})
+    return plant.replace(**{n: getattr(make.rig.plant, n) for n in dry})
 
 
 def _list(names: Sequence[str]) -> str:

@@ -1,32 +1,32 @@
-"""The makes of rigs of the laboratory: whatever an experiment knows of a rig before it is measured, in one table.
+"""The makes of rigs of the laboratory, a file of `models/` each: the rig as designed, and what the course asks of it.
 
 ECP 210 (rectilinear: two carts), ECP 205 (torsional: two disks), and both with the A51 pendulum (linear, furuta); every
-seed is another rig of the same make. Sizes are those of the public guides where there are any; masses are chosen so
-that the modes lie where the paper's tables put them: the pendulums' unstable pole near 7.98 rad/s, the flexible modes
-near 27.1 rad/s. Nothing about the A51 is published, so its rod and weight are plausible brass parts from a shop.
+seed is another rig of the same make.
 """
 
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.physics import CartPendulum, Furuta, Plant, added_inertia, added_mass, chain, name_of
+from upright.physics import Furuta, Plant, added_inertia, added_mass, find, name_of
 from upright.records.record import of_twin
-from upright.rig.hardware import VENDORS, Entry, Hardware, driven_unit, turn_of
+from upright.rig.brass import BrassPendulum
+from upright.rig.hardware import VENDORS, Entry, Hardware, driven_unit
 from upright.rig.rig import Rig
+from upright.units import parse
 
 COUNTS = 16_000
 """Encoder counts per turn of every joint (ECP 205)."""
 SERVO = 0.884e-3
 """Servo period of the ECP controller [s]; it logs every n-th sample."""
-PER_TURN = COUNTS / (2 * math.pi)
-"""Counts per radian."""
 PER_METRE = 16_000 / 0.0706
 """Counts per metre (ECP 210)."""
 CONVERTER = 10 / 32768
@@ -40,62 +40,18 @@ WIDEST = 0.5
 MOTOR_AND_BELT = 5e-4
 """Inertia that the disk loses with its drive belt [kg m^2], by the maker's guide."""
 
-_BRASS = 8500.0  # kg/m^3
 _SPREAD = {"m": 0.02, "J": 0.02, "k": 0.04, "r": 0.01, "b": 0.14, "c": 0.14, "f": 0.14}
-_chain: Any = chain  # whose classes are made at run time
-_ARM = 2.9e-4  # kg m^2, the arm that carries the pendulum, from its drawing
 
 
 @dataclass(frozen=True, kw_only=True)
-class BrassPendulum:
-    """Hollow rod hinged at its end with a disk-shaped weight on it, all brass; lengths [m].
-
-    `weight_at` is the distance from the hinge to the middle of the weight.
-    """
-
-    length: float = 0.330
-    outer: float = 9.53e-3
-    bore: float = 7.94e-3
-    weight_diameter: float = 44e-3
-    weight_thickness: float = 6e-3
-    weight_at: float = 0.200
-
-    def parameters(self) -> dict[str, float]:
-        """Mass, centre of gravity, transverse and axial inertia by the names of `Furuta`, from solid geometry."""
-        rod = _BRASS * math.pi / 4 * (self.outer**2 - self.bore**2) * self.length
-        weight = _BRASS * math.pi / 4 * (self.weight_diameter**2 - self.outer**2) * self.weight_thickness
-        m_p = rod + weight
-        l_cg = (rod * self.length / 2 + weight * self.weight_at) / m_p
-        rod_square, weight_square = self.outer**2 + self.bore**2, self.weight_diameter**2 + self.outer**2
-        transverse_rod = rod * (self.length**2 / 12 + rod_square / 16 + (self.length / 2 - l_cg) ** 2)
-        transverse_weight = weight * (self.weight_thickness**2 / 12 + weight_square / 16 + (self.weight_at - l_cg) ** 2)
-        axial = (rod * rod_square + weight * weight_square) / 8
-        return {"m_p": m_p, "l_cg": l_cg, "J_p": transverse_rod + transverse_weight, "J_a": axial}
-
-
-NOMINAL = Furuta(
-    **BrassPendulum().parameters(),
-    r=0.150,
-    J_d=7.2e-3,  # disk 2.5e-3, arm 0.5e-3, two 500 g masses at 6.5 cm 4.2e-3
-    b_1=6e-4,  # drive belt off
-    b_1c=1.5e-3,
-    b_2=3e-5,
-    b_2c=2.5e-4,
-)
-"""The Furuta pendulum as designed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Oscillator:
-    """One body on a spring to ground, as experiment 1a loads and steps it; friction holds it, encoders count.
+class BodyOnSpring:
+    """How experiment 1a loads and steps one body on a spring to ground; friction holds it, encoders count.
 
     Attributes
     ----------
     kind : {"rectilinear", "torsional"}
-    plant : Plant
+    rig : Rig
         As designed, without added masses.
-    counts, gain, limit : float
-        Of encoder and drive: counts per m or rad, N or N m per V, largest command [V].
     step : float
         Command of a step [V].
     piece : float
@@ -105,10 +61,7 @@ class Oscillator:
     """
 
     kind: Literal["rectilinear", "torsional"]
-    plant: Plant
-    counts: float
-    gain: float
-    limit: float
+    rig: Rig
     step: float
     piece: float
     tolerance: float
@@ -116,7 +69,7 @@ class Oscillator:
     @property
     def inertia(self) -> str:
         """Name of the body's inertia: ``m_1`` or ``J_1``."""
-        return self.plant.names()[0]
+        return self.rig.plant.names()[0]
 
     @property
     def bare(self) -> str:
@@ -126,27 +79,7 @@ class Oscillator:
     @property
     def unit(self) -> str:
         """Unit of the inertia."""
-        return self.plant.quantity(self.inertia).unit
-
-
-OSCILLATORS = {
-    o.kind: o
-    for o in (
-        # cart 1 of the ECP 210 between two springs of 195 N/m
-        Oscillator(
-            kind="rectilinear", plant=_chain(1, "rectilinear")(m_1=0.77, k_1=390.0, c_1=1.2, f_1c=0.2),
-            counts=PER_METRE, gain=5.25, limit=5.0, step=1.0, piece=added_mass(1), tolerance=2e-3,
-        ),
-        # the lower disk of the ECP 205, 2.5e-3 kg m^2 and motor and belt, its shaft clamped above; the tolerance is
-        # 0.2 % of the mass and 0.1 mm of the bolt circle
-        Oscillator(
-            kind="torsional", plant=_chain(1, "torsional")(J_1=3.0e-3, k_1=2.7, c_1=5e-3, f_1c=0.012),
-            counts=PER_TURN, gain=0.65, limit=10.0, step=0.7,
-            piece=added_inertia(1, 0.065, mass_radius=MASS_RADIUS), tolerance=4e-3,
-        ),
-    )
-}  # fmt: skip
-"""Bodies on a spring by their kind."""
+        return self.rig.plant.quantity(self.inertia).unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,26 +100,21 @@ class Mounted:
 
 @dataclass(frozen=True, kw_only=True)
 class Make:
-    """What is known of a rig before it is measured.
+    """A rig as designed, and what the course asks of it before it is measured.
 
     Attributes
     ----------
-    key, name : str
-        As commands and as reports call it.
+    key : str
+        As commands call it.
     stream : int
         Number of its own in the seeds of its rigs.
-    plant : Plant
-        As designed.
+    rig : Rig
+        As designed; 4.884 V is what the vendor's program lets through in its exported logs.
     pendulum : BrassPendulum or None
         What it carries.
-    gain, limit : float
-        Of the drive: N or N m per V, largest command [V]; 4.884 V is what the vendor's program lets through in its
-        exported logs.
-    counts : tuple of float
-        Encoder counts per m or rad.
-    travel : float
-        How far the driven body may go: rail, the pendulum's cable, stops of the carts [m or rad].
-    body, oscillator, mounted : str, Oscillator, Mounted
+    shaft : str
+        3: make of the rig without its pendulum, a second inertia on the shaft instead.
+    body, on_spring, mounted : str, BodyOnSpring, Mounted
         1a: inertia that is weighed, the body on its spring, what the later experiments add to it.
     band : (float, float)
         1b: excited frequencies [rad/s]; below, dry friction holds the rig; above, it hardly moves.
@@ -199,181 +127,109 @@ class Make:
         1b: what the response is to tell.
     start : (float, float)
         2: tilt [rad] and speed [rad/s] with which a clumsy hand lets the pendulum go.
-    shaft : str
-        3: make of the rig without its pendulum, a second inertia on the shaft instead.
-    pulse, twist : float
-        3: size of the pulses that identify the shaft [V]; distance of its ends at which it trips [rad].
+    pulse : float
+        3: size of the pulses that identify the shaft [V].
     push, anchor : float
         4: speed that a careless hand gives the freed body [m/s or rad/s]; stiffness of a soft spring that keeps it
         home [N/m or N m/rad].
     """
 
     key: str
-    name: str
     stream: int
-    plant: Plant
-    pendulum: BrassPendulum | None = None
-    gain: float
-    limit: float = 5.0
-    counts: tuple[float, float]
-    travel: float = math.inf
+    rig: Rig
+    pendulum: BrassPendulum | None
+    shaft: str
     body: str
-    oscillator: Oscillator
+    on_spring: BodyOnSpring
     mounted: Mounted
     band: tuple[float, float]
     reach: tuple[float, float]
-    fastest: tuple[float, float] = (math.inf, math.inf)
+    fastest: tuple[float, float]
     bench: Mapping[str, float]
     sought: tuple[str, ...]
-    start: tuple[float, float] = (0.0, 0.0)
-    shaft: str
-    pulse: float = 0.0
-    twist: float = math.inf
-    push: float = 0.0
-    anchor: float = 0.0
+    start: tuple[float, float]
+    pulse: float
+    push: float
+    anchor: float
 
     @property
     def vendor(self) -> str:
         """Whose rig it is, as studies name the data sheet."""
-        return next(v for v in VENDORS if self.name.startswith(v))
+        return next(v for v in VENDORS if self.rig.name.startswith(v))
 
     @property
     def plant_name(self) -> str:
         """As studies call the plant."""
-        return name_of(type(self.plant))
+        return name_of(type(self.rig.plant))
 
     @property
     def gain_unit(self) -> str:
         """Unit of the drive's gain."""
-        return f"{self.plant.inputs[0].unit}/V"
+        return f"{self.rig.plant.inputs[0].unit}/V"
 
 
-_ON_CART = BrassPendulum(weight_at=0.14)
-_PENDULUM = ("J_p", "b_1", "b_2", "b_1c", "b_2c")
-_SHAFT = ("k_12", "c_1", "c_2", "f_1c", "f_2c")
+def _rig(name: str, rig: Mapping[str, Any], plant: Mapping[str, Any], **more: float) -> Rig:
+    """A rig as designed, in the words of `Rig.known`; what every ECP has alike is not in its file."""
+    given = {n: v for n, v in plant.items() if n != "kind"}
+    kind: Any = find(plant["kind"])
+    built = kind(**given, **{n: v for n, v in more.items() if n in kind.names()})
+    return Rig.known(built, name=name, converter=CONVERTER, delay=SERVO, lag=LAG, period=SERVO, **rig)
 
-MAKES: Mapping[str, Make] = {
-    make.key: make
-    for make in (
-        Make(
-            key="furuta",
-            name="ECP 205 + A51, Furuta pendulum",
-            stream=1,
-            shaft="torsional",
-            plant=NOMINAL.replace(b_1=2e-3, b_1c=8e-3),  # drive belt on
-            pendulum=BrassPendulum(),
-            gain=0.65,
-            counts=(PER_TURN, PER_TURN),
-            travel=2 * math.pi,
-            body="J_d",
-            oscillator=OSCILLATORS["torsional"],
-            mounted=Mounted(
-                pieces=2,
-                each=added_inertia(1, 0.060, mass_radius=MASS_RADIUS),
-                rest=_ARM,
-                rest_error=0.03 * _ARM,
-                bare="Pendulum and arm are taken off, the shaft is clamped above; the disk swings with motor and belt.",
-                later="With two 500 g masses at 6 cm and the arm (from its drawing) mounted, the disk of the pendulum "
-                "has",
-            ),
-            band=(3.0, 35.0),
-            reach=(0.6, 0.18),
-            fastest=(3.0, math.inf),
-            bench={"m_p": 2e-3, "l_cg": 3e-3, "r": 3e-3},
-            sought=("J_d", *_PENDULUM),
-            start=(math.radians(12), 2.2),
-            push=0.15,
-            anchor=0.04,  # on which the disk alone would swing at a third of the pendulum's frequency
-        ),
-        Make(
-            key="linear",
-            name="ECP 210 + A51, pendulum on a cart",
-            stream=0,
-            shaft="rectilinear",
-            plant=CartPendulum(
-                m_c=0.60,  # cart without its masses
-                **{n: v for n, v in _ON_CART.parameters().items() if n != "J_a"},
-                b_1=1.2,
-                b_1c=0.25,
-                b_2=3e-5,
-                b_2c=2.5e-4,
-            ),
-            pendulum=_ON_CART,
-            gain=5.25,
-            counts=(PER_METRE, PER_TURN),
-            travel=0.20,
-            body="m_c",
-            oscillator=OSCILLATORS["rectilinear"],
-            mounted=Mounted(
-                pieces=0,
-                each=added_mass(1),
-                bare="The pendulum is taken off; the cart swings between two springs to ground.",
-                later="The cart carries the pendulum without masses on it:",
-            ),
-            band=(5.0, 45.0),
-            reach=(0.025, 0.18),
-            bench={"m_p": 2e-3, "l_cg": 3e-3},
-            sought=("m_c", *_PENDULUM),
-            start=(math.radians(12), 1.5),
-            push=0.05,
-            anchor=20.0,
-        ),
-        Make(
-            key="rectilinear",
-            name="ECP 210, two carts",
-            stream=2,
-            shaft="rectilinear",
-            plant=_chain(2, "rectilinear")(m_1=1.10, m_2=1.07, k_12=398.0, c_1=2.2, c_2=2.0, f_1c=0.2, f_2c=0.1),
-            gain=5.25,
-            counts=(PER_METRE, PER_METRE),
-            travel=0.03,
-            body="m_1",
-            oscillator=OSCILLATORS["rectilinear"],
-            mounted=Mounted(
-                pieces=1,
-                each=added_mass(1),
-                bare="Cart 2 is clamped; cart 1, its mass unbolted, swings on the spring between the two.",
-                later="With one 500 g mass bolted on, as later, cart 1 has",
-            ),
-            band=(6.0, 70.0),
-            reach=(0.02, 0.02),
-            bench={"m_2": 3e-3},
-            sought=("m_1", *_SHAFT),
-            pulse=0.6,
-        ),
-        Make(
-            key="torsional",
-            name="ECP 205, two disks",
-            stream=3,
-            shaft="torsional",
-            plant=_chain(2, "torsional")(
-                J_1=7.8e-3, J_2=6.9e-3, k_12=2.7, c_1=1.2e-2, c_2=1.0e-2, f_1c=8e-3, f_2c=2e-3
-            ),
-            gain=0.65,
-            limit=10.0,
-            counts=(PER_TURN, PER_TURN),
-            body="J_1",
-            oscillator=OSCILLATORS["torsional"],
-            mounted=Mounted(
-                pieces=2,
-                each=OSCILLATORS["torsional"].piece,
-                bare="Disk 2 is clamped; disk 1, its masses unbolted, swings on the shaft between the two.",
-                later="With two 500 g masses at 6.5 cm bolted on, as later, disk 1 has",
-            ),
-            band=(4.0, 70.0),
-            reach=(0.4, 0.4),
-            bench={"J_2": 1e-2},
-            sought=("J_1", *_SHAFT),
-            pulse=0.4,
-            twist=math.radians(25),
-        ),
+
+def _si(entry: Any) -> Any:
+    """Numbers in SI of texts with their units, in lists and tables too."""
+    if isinstance(entry, Mapping):
+        return {n: _si(v) for n, v in entry.items()}
+    if isinstance(entry, list):
+        return tuple(_si(v) for v in entry)
+    return parse(entry) if isinstance(entry, str) else entry
+
+
+def _piece(table: Mapping[str, Any]) -> float:
+    """Inertia that a 500 g mass adds: itself to a cart, at its bolt circle to a disk."""
+    return added_inertia(1, parse(table["radius"]), mass_radius=MASS_RADIUS) if "radius" in table else added_mass(1)
+
+
+def _body(key: Any, table: Mapping[str, Any]) -> BodyOnSpring:
+    rig = _rig(f"a {key} rig", table["rig"], table["plant"])
+    return BodyOnSpring(
+        kind=key, rig=rig, step=parse(table["step"]), piece=_piece(table), tolerance=parse(table["tolerance"])
     )
+
+
+def _make(key: str, content: Mapping[str, Any]) -> Make:
+    asked, w = content["frequency"], content["weighing"]
+    pendulum = BrassPendulum(**_si(content["pendulum"])) if "pendulum" in content else None
+    known = pendulum.parameters() if pendulum else {}
+    later: dict[str, Any] = {"pulse": 0.0, "push": 0.0, "anchor": 0.0, "start": (0.0, 0.0)}
+    for part in ("regulation", "tracking", "free_swing"):
+        later |= _si(content.get(part, {}))
+    return Make(
+        key=key, stream=content["stream"], rig=_rig(content["name"], content["rig"], content["plant"], **known),
+        pendulum=pendulum, shaft=content["shaft"], body=w["body"], on_spring=BODIES[content["shaft"]],
+        mounted=Mounted(
+            pieces=w["pieces"], each=_piece(w), rest=_si(w.get("rest", 0.0)), rest_error=_si(w.get("rest_error", 0.0)),
+            bare=w["bare"], later=w["later"],
+        ),
+        band=_si(asked["band"]), reach=_si(asked["reach"]), fastest=_si(asked.get("fastest", [math.inf, math.inf])),
+        bench=_si(asked["bench"]), sought=tuple(asked["sought"]), **later,
+    )  # fmt: skip
+
+
+_FILES = {
+    key: tomllib.loads((Path(__file__).parent / "models" / f"{key}.toml").read_text(encoding="utf-8"))
+    for key in ("furuta", "linear", "rectilinear", "torsional")
 }
+BODIES = {key: _body(key, content["on_spring"]) for key, content in _FILES.items() if "on_spring" in content}
+"""Bodies on a spring by their kind."""
+MAKES: Mapping[str, Make] = {key: _make(key, content) for key, content in _FILES.items()}
 """The makes by key, the paper's own first."""
 PENDULUMS = tuple(key for key, make in MAKES.items() if make.pendulum)
 """Makes that swing and are held upright."""
 SHAFTS = tuple(key for key, make in MAKES.items() if not make.pendulum)
 """Makes with two inertias on a shaft."""
+NOMINAL = cast("Furuta", MAKES["furuta"].rig.plant).replace(b_1=6e-4, b_1c=1.5e-3)
+"""The Furuta pendulum as designed, its drive belt off."""
 
 
 def make_named(key: str, among: tuple[str, ...] = tuple(MAKES), *, option: str = "--rig") -> Make:
@@ -392,7 +248,7 @@ def make_named(key: str, among: tuple[str, ...] = tuple(MAKES), *, option: str =
 def make_of(plant: Plant, refusal: str = "") -> Make:
     """Make whose plant this is; where none has such a plant, `BadInput` says so, or the `refusal`."""
     for make in MAKES.values():
-        if isinstance(plant, type(make.plant)):
+        if isinstance(plant, type(make.rig.plant)):
             return make
     raise BadInput(refusal or f"none of the makes {', '.join(MAKES)} is a {type(plant).__name__}.")
 
@@ -414,7 +270,7 @@ def make_of_rig(rig: Rig) -> Make:
 
 def make_of_vendor(vendor: str, plant: Plant) -> Make | None:
     """Make of a vendor that has this plant, None where he has none, or none was named."""
-    return next((m for m in MAKES.values() if m.vendor == vendor and type(m.plant) is type(plant)), None)
+    return next((m for m in MAKES.values() if m.vendor == vendor and type(m.rig.plant) is type(plant)), None)
 
 
 def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
@@ -425,11 +281,9 @@ def sheet(vendor: str, plant: Plant, unit: str = "V") -> dict[str, Entry]:
     numbers = {f"counts.{c.name}": per[c.unit] for c in plant.coordinates if c.unit in per}
     numbers |= {"servo_period": (SERVO, "s"), "delay": (SERVO, "s"), "lag": (LAG, "s")}
     if unit in ("", "V"):
-        numbers |= {"converter": (CONVERTER, "V")} | ({"limit": (make.limit, "V")} if make else {})
-    if make and math.isfinite(make.travel):
-        numbers |= {"travel": (make.travel, driven_unit(type(plant)))}
-    if make and math.isfinite(make.twist):
-        numbers |= {"twist": (make.twist, driven_unit(type(plant)))}
+        numbers |= {"converter": (CONVERTER, "V")} | ({"limit": (make.rig.limit, "V")} if make else {})
+    far = () if make is None else (("travel", make.rig.travel), ("twist", make.rig.twist))
+    numbers |= {name: (value, driven_unit(type(plant))) for name, value in far if math.isfinite(value)}
     return {name: Entry(value=value, unit=unit, source=source) for name, (value, unit) in numbers.items()}
 
 
@@ -452,29 +306,24 @@ def make_rig(key: str, seed: int = 0) -> Rig:
     if key not in MAKES:
         raise BadInput(f"there is no make '{key}'; take one of {', '.join(MAKES)}.")
     make = MAKES[key]
-    plant, gain = make.plant, make.gain
-    if seed:
-        rng = np.random.default_rng([seed, 41, make.stream])
-        changed: dict[str, float] = {}
-        if make.pendulum:
-            parts = BrassPendulum(
-                length=make.pendulum.length * rng.normal(1, 0.01),
-                weight_thickness=make.pendulum.weight_thickness * rng.normal(1, 0.02),
-                weight_at=make.pendulum.weight_at * rng.normal(1, 0.02),
-            )
-            changed = {n: v for n, v in parts.parameters().items() if n in plant.names()}
-        for name, value in plant.parameters().items():
-            spread = _SPREAD.get(name[0], 0.0)
-            if value and name not in changed and name != "g":
-                changed[name] = value * math.exp(rng.normal(0, spread))
-        plant = plant.replace(**changed)
-        gain *= math.exp(rng.normal(0, 0.02))
-    counts = [turn_of(c.unit) * n for c, n in zip(plant.coordinates, make.counts, strict=True)]
-    known = Rig.known(
-        plant, name=make.name, gain=gain, limit=make.limit, converter=CONVERTER, delay=SERVO, lag=LAG,
-        counts=counts, period=SERVO, travel=make.travel, twist=make.twist,
-    )  # fmt: skip
-    return replace(known, seed=seed)
+    rig = make.rig
+    if not seed:
+        return rig
+    rng = np.random.default_rng([seed, 41, make.stream])
+    changed: dict[str, float] = {}
+    if make.pendulum:
+        parts = replace(
+            make.pendulum,
+            length=make.pendulum.length * rng.normal(1, 0.01),
+            weight_thickness=make.pendulum.weight_thickness * rng.normal(1, 0.02),
+            weight_at=make.pendulum.weight_at * rng.normal(1, 0.02),
+        )
+        changed = {n: v for n, v in parts.parameters().items() if n in rig.plant.names()}
+    for name, value in rig.plant.parameters().items():
+        spread = _SPREAD.get(name[0], 0.0)
+        if value and name not in changed and name != "g":
+            changed[name] = value * math.exp(rng.normal(0, spread))
+    return replace(rig.changed(**changed), gain=rig.gain * math.exp(rng.normal(0, 0.02)), seed=seed)
 
 
 def check_radius(radius: float) -> float:

@@ -110,7 +110,7 @@ def ticks(period: float, tick: float) -> int:
     whole = round(period / tick)
     if not 1 <= whole <= _LONGEST or not math.isclose(whole * tick, period, rel_tol=1e-3):
         raise BadInput(
-            f"a period of {1e3 * period:.6g} ms is asked for, and the rig ticks every {1e3 * tick:.6g} ms; design for "
+            f"a period of {1e3 * period:.6g} ms is requested, and the rig ticks every {1e3 * tick:.6g} ms; design for "
             f'that or up to {_LONGEST} times as much: upright design FIT --period "{1e3 * tick:.6g} ms".'
         )
     return whole

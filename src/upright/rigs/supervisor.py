@@ -2,8 +2,8 @@
 
 The order is fixed: open and read limits back, zero the encoders where it hangs, a small pulse whose answer is compared
 with the model's, the start window, a start without a jump; then, tick by tick, a look at the rig's own faults, at
-samples that do not go on, at travel, at how far it leans, at the command, at whether the driven body moves as its
-command and the pendulum on it say, and at the innovations of a bank of Kalman filters, which see an encoder that lies.
+samples that do not go on, at the length of its tick, at travel, at how far it leans, at the command, and at whether
+command, driven body and pendulum agree (`control.watch`), which tells a wrong encoder or drive from a hand.
 Every way out goes through `LiveRig.estop` first.
 
 This is supervision in software on a computer that may hang, not a rated safety function: a rig needs a stop in
@@ -18,15 +18,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from upright.control.sensors import Watch
 from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rig import Rig
 from upright.rigs.board import Board, fault_text
-from upright.rigs.driven import DrivenScale, StillDrive
+from upright.rigs.doubts import Doubts
 from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
+from upright.rigs.tick_length import TickLength
 from upright.rigs.twin import TwinPort
 
 ALIKE = 1.5
@@ -64,7 +64,7 @@ class Duty:
     near : float
         The same for a start.
     watch : bool
-        Whether the bank of filters runs beside the loop; for a pendulum that is held upright.
+        Whether encoders and drive are doubted beside the loop; for a pendulum that is held upright.
     """
 
     limits: Limits | None
@@ -77,7 +77,7 @@ class Duty:
 
     @property
     def watched(self) -> bool:
-        """Whether a bank of filters can say something of it."""
+        """Whether encoders and drive can be told from hands and friction."""
         return self.watch and self.model is not None and self.at == "inverted" and len(self.model.per_unit) == 2
 
 
@@ -93,21 +93,23 @@ class Supervisor:
         Called with ``(time, kind, text)`` of each event.
     stopped : callable
         Called at every tick; answers why to stop, or an empty text.
+    clock : callable or None
+        The host's own time [s], with which the board's is compared; None where the board's is virtual.
     """
 
     rig: LiveRig
     duty: Duty
     event: Event = unheard
     stopped: Callable[[], str] = field(default=lambda: "")
+    clock: Callable[[], float] | None = None
     about: Capabilities = field(init=False)
     held: Limits = field(init=False)
     law: Law | Rule = field(init=False)
     faults: Fault = field(init=False, default=NO_FAULT)
     target: tuple[float, ...] = field(init=False, default=())
     _running: RunningLaw | None = field(init=False, default=None)
-    _watch: Watch | None = field(init=False, default=None)
-    _still: StillDrive | None = field(init=False, default=None)
-    _scale: DrivenScale | None = field(init=False, default=None)
+    _doubts: Doubts | None = field(init=False, default=None)
+    _ticking: TickLength = field(init=False)
     _last: Tick | None = field(init=False, default=None)
     _first: Tick | None = field(init=False, default=None)
     _command: float = field(init=False, default=0.0)
@@ -193,9 +195,7 @@ class Supervisor:
         self._in_window()
         # what takes time is done before anything is switched on
         watched = self.duty.model if self.duty.watched else None
-        self._watch = Watch(watched, self.duty.at) if watched else None
-        self._still = StillDrive(watched, self.duty.at) if watched else None
-        self._scale = DrivenScale(watched, self.duty.at) if watched else None
+        self._doubts = Doubts(watched, self.duty.at, self.about.name) if watched else None
         return fitted
 
     def start(self, mode: Mode = Mode.HOST) -> None:
@@ -211,6 +211,7 @@ class Supervisor:
         self.rig.start(mode, self.law if mode == Mode.MCU and isinstance(self.law, Law) else None)
         self._running, self._mode = RunningLaw(self.law, self.about.period), mode
         self._last, self._first, self._command, self._stale = None, None, 0.0, 0
+        self._ticking = TickLength()
         self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
 
     def _arm(self) -> None:
@@ -236,13 +237,13 @@ class Supervisor:
         if abs(readings[-1] - self.target[-1]) > self.duty.near:
             self._give_up(
                 Fault.START, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
-                f"where it is to be held, and a run starts within {self._shown(self.duty.near)}; bring it there.",
+                f"where it is to be stabilised, and a run starts within {self._shown(self.duty.near)}; bring it there.",
             )  # fmt: skip
         first = RunningLaw(self.law, self.about.period).step(readings, 0.0)  # a reference may ask for all there is
         if abs(first) >= self.held.command:
             self._give_up(
                 Fault.START, f"the law would begin with its largest command, {first:.3g} {self.about.command_unit}; "
-                "bring the rig closer to where it is to be held, and let it rest.",
+                "bring the rig closer to where it is to be stabilised, and let it rest.",
             )  # fmt: skip
 
     def step(self, tick: Tick, reference: float | None = None) -> float:
@@ -256,13 +257,18 @@ class Supervisor:
         if reason := self.stopped():
             self._give_up(Fault.STOP, reason)
         if tick.mode != self._mode or tick.faults:
-            self._give_up(tick.faults, f"{self.about.name} stopped itself: {fault_text(tick.faults)}.")
+            self._give_up(tick.faults, f"{self.about.name} stopped itself: {fault_text(tick.faults)}.{self._likeliest}")
         if self._last is not None and tick.tick <= self._last.tick:
             self._stale += 1
             if self._stale * self.about.period > self.held.watchdog:
                 self._give_up(Fault.STALE, f"{self.about.name} has shown the same sample {self._stale + 1} times.")
             return self._command  # nothing new to answer
         before, self._last, self._first, self._stale = self._last or tick, tick, self._first or tick, 0
+        if self.clock is not None and (longer := self._ticking.sees(tick.time, self.clock())) != 1.0:
+            self._give_up(
+                Fault.MODEL, f"{self.about.name} is not timed as it says: its tick lasts {longer:.3g} times "
+                f"{1e3 * self.about.period:.4g} ms by this computer's clock. Look at the board's clock and prescaler.",
+            )  # fmt: skip
         self._look(self.readings(tick))
         if self._running is None:
             raise BadInput("the loop was not started; call start first.")
@@ -271,11 +277,13 @@ class Supervisor:
             command = self._running.step(readings, reference, time - self._first.time)
             if not math.isfinite(command):
                 self._give_up(Fault.GAINS, f"the law gave {command} for a command.")
-            if self._watch is not None and self._still is not None and self._scale is not None:
+            if self._doubts is not None:
                 # until the host has answered, its last command is what drives the rig
                 drives = command if self._mode == Mode.MCU or time == tick.time else self._command
                 drives = min(max(drives, -self.held.command), self.held.command)
-                self._suspect(self._watch, self._still, self._scale, readings, drives)
+                away = [q - t for q, t in zip(readings, self.target, strict=True)]
+                if wrong := self._doubts.sees(readings, away, drives):
+                    self._give_up(*wrong)
         self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
 
@@ -318,6 +326,10 @@ class Supervisor:
         return self._stale > 0
 
     @property
+    def _likeliest(self) -> str:
+        return "" if self._doubts is None else self._doubts.likeliest
+
+    @property
     def _time(self) -> float:
         return 0.0 if self._last is None else self._last.time
 
@@ -328,33 +340,8 @@ class Supervisor:
         if abs(readings[-1] - self.target[-1]) > self.duty.lean:
             self._give_up(
                 Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} left what is held by "
-                f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell.",
-            )  # fmt: skip
-
-    def _suspect(
-        self, watch: Watch, still: StillDrive, scale: DrivenScale, readings: Sequence[float], command: float
-    ) -> None:
-        """Stop when an encoder lies, or must have died."""
-        away = [q - t for q, t in zip(readings, self.target, strict=True)]
-        watch.see([away], command)
-        alarm, which = watch.speaks()
-        if alarm[0]:
-            what = watch.suspicions[int(which[0])]
-            self._give_up(
-                Fault.MODEL, f"{self.about.name} does not move as its model does; likeliest is {what}. Check that "
-                "encoder's wiring and counts (upright rig doctor); if a hand pushed it, start again.",
-            )  # fmt: skip
-        wrong = scale.sees(away, command)
-        if wrong == "wrong way round":
-            self._give_up(
-                Fault.MODEL, f"{scale.name} is shown the wrong way round: command and pendulum say that it moves "
-                "against what its encoder shows. Check that encoder's channels (upright rig doctor); if a hand pushed "
-                "it, start again.",
-            )  # fmt: skip
-        if still.sees(readings[still.which], away, command) or wrong:
-            self._give_up(
-                Fault.ENCODER, f"{still.name} shows not a single count although its command must have moved it: its "
-                "encoder is dead, or something holds it fast.",
+                f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell."
+                f"{self._likeliest}",
             )  # fmt: skip
 
     def _give_up(self, fault: Fault, why: str) -> None:

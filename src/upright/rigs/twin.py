@@ -32,6 +32,7 @@ class BrokenEncoders:
     def __init__(self, channels: int) -> None:
         self._factor = [1.0] * channels
         self._bits = [0] * channels
+        self._slip = [0.0] * channels
         self._true: list[float] = []
         self._shown: list[float] = [0.0] * channels
 
@@ -47,6 +48,10 @@ class BrokenEncoders:
         """So many counts are missed at once."""
         self._shown[channel] -= counts
 
+    def slipping(self, channel: int, counts: float) -> None:
+        """It loses so many counts more with every sample, as a coupling that slips or a zero that drifts."""
+        self._slip[channel] = counts
+
     def wrapped(self, channel: int, bits: int) -> None:
         """Its counter has only so many bits, and nobody unwraps it."""
         self._bits[channel] = bits
@@ -56,7 +61,7 @@ class BrokenEncoders:
         if not self._true:
             self._true, self._shown = list(true), list(true)
         for i, now in enumerate(true):
-            self._shown[i] += self._factor[i] * (now - self._true[i])
+            self._shown[i] += self._factor[i] * (now - self._true[i]) - self._slip[i]
             self._true[i] = now
         out = [math.floor(s + 0.5) for s in self._shown]
         return tuple(_wrap(n, bits) if bits else n for n, bits in zip(out, self._bits, strict=True))

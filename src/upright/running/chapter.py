@@ -102,7 +102,7 @@ def checkup_chapter(checkup: Checkup, rig: str) -> Chapter:
     step = (
         Step("Close a loop on it.", f"upright run --rig {rig} --law design.json --duration 30")
         if checkup.sound
-        else Step("Mend what is said above, and look again.", f"upright rig doctor {rig}")
+        else Step("Mend what is reported above, and look again.", f"upright rig doctor {rig}")
     )
     return Chapter(
         title=f"Check-up of {checkup.name}", verdict=checkup.verdict, sound=checkup.sound, steps=(step,),

@@ -137,7 +137,7 @@ def _by_hand(
         away[2 * i] = 2 * size
         rig.port.hold(next(iter(model.plant.equilibria)), away)
     else:
-        return CheckupFinding(what=what, observed="nobody moved it", good=None)
+        return CheckupFinding(what=what, observed="it was not moved", good=None)
     moved = (rig.exchange(0.0).counts[i] - before.counts[i]) / per
     shown = f"{math.degrees(moved):.3g} degrees" if unit == "rad" else f"{1e3 * moved:.3g} mm"
     if abs(moved) < size / 10:

@@ -91,7 +91,7 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
     tilt : float
         Of the last coordinate when the hand of a twin lets go [rad or m].
     watch : bool
-        Whether the bank of filters runs beside the loop.
+        Whether encoders and drive are doubted beside the loop.
     from_rest : bool
         Whether a run begins where the rig rests, and may lean as it will: a swing-up.
     bolted : float

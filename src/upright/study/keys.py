@@ -96,7 +96,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("title", '"Crane, three gains"', "heading of the report"),
             Key("source", '"https://..."', "where the data come from; text for the report"),
             Key("rig", "table", "the plant, and what its servo keeps to"),
-            Key("parameters", "table", "every number of the plant: known or asked"),
+            Key("parameters", "table", "every number of the plant: known or estimated"),
             Key("actuator", "table", "what stands between command and force"),
             Key("sensors", "table", "how a column becomes a coordinate"),
             Key("drive", "table", "what commands the (first) input; a run without it is free"),
@@ -113,7 +113,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key(
                 "guessed",
                 "true",
-                "nobody named the plant: its numbers count as a guess until a run that was not fitted is predicted",
+                "the plant is a guess: its numbers count as one until a run that was not fitted is predicted",
             ),
             Key("substeps", "2", "integration steps per sample"),
             Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if left out"),
@@ -138,7 +138,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key(
                 "assumed",
                 "true",
-                "a number that nobody measured: no estimate that rests on it can be used",
+                "a number that was not measured: no estimate that rests on it can be used",
             ),
             Key("measured", "true", "a known number that somebody measured on this rig, as one with an uncertainty is"),
             Key("guess", '"1.6e-3 kg m^2"', "a number to estimate, and where to start"),
@@ -166,6 +166,8 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
                 for name, what in ACTUATOR.items()
             ),
             Key("converter", '"0.3 mV"', "smallest step of the command, for simulations; not rounded if left out"),
+            Key("bits", "12", "of the converter instead of its step, together with"),
+            Key("range", '"10 V"', "its largest command to either side: the step is 2 range/2^bits"),
         ),
     ),
     "sensors": ("[sensors.COORDINATE]", _SENSOR),

@@ -81,7 +81,7 @@ def _default(study: Section, plant: type[Plant], name: str) -> float:
         raise study.error(
             "parameters",
             f"{plant.__name__} needs {name} ({what.meaning}, in {what.unit}) under [parameters]: known, as in"
-            f' {name} = "1 {what.unit}", or asked, as in {name} = {{ guess = "1 {what.unit}" }}',
+            f' {name} = "1 {what.unit}", or estimated, as in {name} = {{ guess = "1 {what.unit}" }}',
         )
     return float(value)  # type: ignore[arg-type]
 

@@ -67,7 +67,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml they are made on the rig itself; you are asked for what no drive can do.
+    With a RIG.toml they are made on the rig itself; you are prompted for what no drive can do.
 
     upright lab
     upright lab --rig linear --seed 3
@@ -131,6 +131,9 @@ def lab(
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
+    rig = os.fspath(rig) if isinstance(rig, os.PathLike) else rig
+    if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
+        raise BadInput(f"a laboratory's rig is a make, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
     itself = rig.endswith(".toml") or rig.startswith("serial:")
     if rig and not itself:
         make_named(rig)
@@ -201,16 +204,14 @@ def _live(
     if rig.startswith("serial:"):
         path = write_templates(folder, rig.removeprefix("serial:"))
         raise BadInput(
-            "a rig of hardware needs a description and limits, which nobody else can know: fill in "
+            "a rig of hardware needs a description and limits, which only you know: fill in "
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
         raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
-        raise BadInput(
-            "experiments on hardware need a person beside it who is asked: run upright lab in a terminal, or give ask."
-        )
+        raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")
     return live
 
 
@@ -302,7 +303,7 @@ def survey(
     n : int, optional
         Answers behind printed means or shares, at least 2.
     scale : str or (int, int)
-        Ends of the scale of the ratings.
+        Ends of the scale of the ratings, ``"1-4"`` or ``"0-100"``; people may rate between its whole numbers.
     out : path, optional
         Folder for report.html.
     pdf : bool
@@ -327,7 +328,7 @@ def survey(
     if n is not None and n < 2:
         raise BadInput(f"--n needs a whole number of at least 2, got {n}.")
     scale_text = scale if isinstance(scale, str) else f"{scale[0]}-{scale[1]}"
-    ends = re.fullmatch(r"\s*(\d{1,2})\s*(?:-|to)\s*(\d{1,2})\s*", scale_text)
+    ends = re.fullmatch(r"\s*(\d{1,3})\s*(?:-|to)\s*(\d{1,3})\s*", scale_text)
     if ends is None or int(ends[1]) >= int(ends[2]):
         raise BadInput(f"--scale needs its two ends, such as 1-4, got '{scale_text}'.")
     limits = (int(ends[1]), int(ends[2]))
@@ -342,7 +343,7 @@ def survey(
         if n is not None:
             raise BadInput(f"--n is for printed summaries; '{name}' holds single answers, which are counted.")
     elif n is None:
-        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they are said to rest on.")
+        raise BadInput(f"'{name}' holds printed numbers; say with --n how many answers they rest on.")
     again = f"{command}{'' if n is None else f' --n {n}'} --json"
     page = chapter(
         sheet, title=f"Survey: {Path(name).stem.replace('_', ' ')}", source=name, answers=n, scale=limits,

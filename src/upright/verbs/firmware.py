@@ -37,7 +37,7 @@ def firmware_build(
     Parameters
     ----------
     board : str
-        ``"mega"``, an Arduino Mega 2560.
+        ``"mega"``, an Arduino Mega 2560, or ``"pico"``, a Raspberry Pi Pico.
     drive : str
         ``"analog"``: a converter into a servo amplifier; ``"pair"``: an H-bridge with a PWM line for each way
         (BTS7960, DRV8871); ``"sign"``: one PWM line and the way (VNH5019, L298N).

@@ -11,7 +11,7 @@ from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, page_folder, write_page
-from upright.verbs.values import si_if_given
+from upright.verbs.values import path_of, si_if_given
 
 if TYPE_CHECKING:
     from upright.realtime.jitter import Jitter
@@ -75,7 +75,7 @@ def run(
     check : bool
         Compare a small pulse with the model first.
     watch : bool
-        Look for faulty encoders beside the loop, by a bank of Kalman filters.
+        Tell wrong encoders and a weak drive from hands and friction beside the loop.
     accept : str, optional
         Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
         not armed.
@@ -102,7 +102,8 @@ def run(
     folder = page_folder(out, pdf)
     leaning = si_if_given(tilt, "rad") or 0.0
     request = RunRequest(
-        rig=Path(rig), law=None if law is None else Path(law), excite=excite, reference=reference, seconds=duration,
+        rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
+        excite=excite, reference=reference, seconds=duration,
         mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
     )  # fmt: skip
     result = run_rig(request, folder, watch=observe)
@@ -218,5 +219,6 @@ def rig_doctor(
     from upright.running.chapter import checkup_chapter
     from upright.running.doctor import check_up
 
-    checkup = check_up(Path(rig), hand=hand, clear=clear, pulse=pulse)
-    return Answer(checkup, checkup_chapter(checkup, typed(Path(rig))))
+    file = path_of(rig, "a rig on hardware")
+    checkup = check_up(file, hand=hand, clear=clear, pulse=pulse)
+    return Answer(checkup, checkup_chapter(checkup, typed(file)))

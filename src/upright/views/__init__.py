@@ -71,7 +71,7 @@ def _(record: Record) -> Chapter:
     t = record.t
     role = dict.fromkeys(record.inputs, "drives") | dict.fromkeys(record.outputs, "measured")
     rows = tuple(
-        (name, unit(record.units[name]) or ("–" if record.units[name] else "not said"), role.get(name, ""),
+        (name, unit(record.units[name]) or ("–" if record.units[name] else "not specified"), role.get(name, ""),
          number(float(values.min())), number(float(values.max())))
         for name, values in list(record.signals.items())[:MOST_ROWS]
     )  # fmt: skip

@@ -101,7 +101,7 @@ def test_each_quality_has_a_panel_of_whole_decades():
 def test_what_nobody_measured_is_said_and_not_drawn():
     bare = FrequencyResponse(omega=OMEGA, response=RESPONSE, outputs=("x", "theta"), drive=np.full(5, 1.0 + 0j))
     harmonics = quality_figure(bare).axes[1]
-    assert [t.get_text() for t in harmonics.texts] == ["not told by a sweep"]
+    assert [t.get_text() for t in harmonics.texts] == ["not measured by a sweep"]
     assert not len(harmonics.get_yticks())
     amplitude = quality_figure(bare).axes[3]
     assert [t.get_text() for t in amplitude.get_legend().get_texts()] == ["x", "θ", "command"]  # no units, no brackets

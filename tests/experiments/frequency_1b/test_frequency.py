@@ -15,7 +15,7 @@ from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_figure
 from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
 from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, _probed, broadband, collect, grid, sines, stepped_sine
-from upright.experiments.stand.known import asked, bench
+from upright.experiments.stand.known import bench, model_of
 from upright.identification.frequency.answer import explain, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
@@ -95,7 +95,7 @@ def test_a_noisy_sweep_states_its_errors():
 
 def test_what_asks_nothing_is_refused():
     still = Record(t=np.arange(100) * TICK, signals={"u": np.zeros(100), "y": np.zeros(100)})
-    with pytest.raises(NotIdentifiable, match="nothing was asked"):
+    with pytest.raises(NotIdentifiable, match="nothing was excited"):
         response_of([still], command="u", outputs=["y"])
     with pytest.raises(NotIdentifiable, match="three periods"):
         response_of([log(np.sin(np.arange(1000) * 1e-3))], command="u", outputs=["y"], kind="sines")
@@ -150,9 +150,9 @@ def test_a_sine_moves_the_rig_as_far_as_it_may_or_as_the_drive_can(hurried):
     _, middle, fast = hurried.dwells
     reached = [np.max(np.ptp(d.record.y, axis=0) / 2 / np.array(make.reach)) for d in (middle, fast)]
     assert 0.75 < reached[0] < 1.33
-    assert middle.amplitude < SHARE * make.limit
+    assert middle.amplitude < SHARE * make.rig.limit
     assert reached[1] < 0.75
-    assert fast.amplitude == pytest.approx(SHARE * make.limit, rel=0.02)
+    assert fast.amplitude == pytest.approx(SHARE * make.rig.limit, rel=0.02)
 
 
 @pytest.mark.parametrize("first", [0.2, 5.0])
@@ -190,7 +190,7 @@ def done(hurried, tmp_path_factory):
         omega=omega, response=answer, outputs=("x", "theta"), units=("m", "rad", "V"),
         variance=1e-6 * np.abs(answer) ** 2, dry=4 / (np.pi * np.abs(answer) * omega[:, None]),
     )  # fmt: skip
-    explained = explain(asked(make, bench(rig, make), make.bench), "hanging", data)
+    explained = explain(model_of(make, bench(rig, make), make.bench), "hanging", data)
     return FrequencyRun(
         rig=rig, make=make, sweep=hurried, answer=explained, folder=tmp_path_factory.mktemp("told"), kind="sines",
         seconds=1.0,

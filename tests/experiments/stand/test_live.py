@@ -129,7 +129,7 @@ def test_what_is_no_rig_at_hand_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no file"):
         up.lab(rig=str(tmp_path / "NONE.toml"), out=tmp_path / "out")
     made(tmp_path)
-    with pytest.raises(BadInput, match="as it is, and there is one"):
+    with pytest.raises(BadInput, match="there is one rig, as it is"):
         up.lab(rig=str(tmp_path / "RIG.toml"), nonideal=True, out=tmp_path / "out")
     (tmp_path / "run.csv").write_text("t,u,psi,theta\n0,0,0,0\n0.001,0,0,0\n", encoding="utf-8")
     with pytest.raises(BadInput, match="a replay answers nothing"):

@@ -157,4 +157,4 @@ def test_a_rig_with_numbers_of_its_own_is_called_by_its_seed():
     assert chapter(experiment(climbed())).title.endswith(", seed 3")
     assert "seed" not in chapter(experiment(climbed(), truth=RIG)).title
     assert "numbers identified hanging" in chapter(experiment(climbed(), source="fit.json")).detail
-    assert "as designed" in chapter(experiment(climbed())).detail
+    assert "nominal numbers" in chapter(experiment(climbed())).detail

@@ -96,9 +96,9 @@ def test_a_step_is_told_twice_as_predicted_and_as_measured():
     by_law = {law.name: table.rows[2 * i : 2 * i + 2] for i, law in enumerate(LAWS)}
     for name, (predicted, measured) in by_law.items():
         assert (predicted[0], measured[0]) == (name, "")
-        assert predicted[1] == "foreseen"
+        assert predicted[1] == "predicted"
         assert predicted[2:] == cells
-        assert measured[1] == "found"
+        assert measured[1] == "measured"
     assert by_law["set 4"][1][2:] == ("0.200", *cells[1:8], "4.56 %")
     assert by_law["set 1"][1][2:8] == ("does not move", *("–",) * 5)
     assert by_law["far"][1][2:8] == ("trips at 0.40 s", *("–",) * 5)
@@ -109,9 +109,9 @@ def test_a_step_is_told_twice_as_predicted_and_as_measured():
 
 def test_without_a_rig_only_what_is_predicted_stands_in_the_tables():
     alone = tracking(outcome(SET_1), outcome(SET_4))
-    assert [row[:2] for row in tables.step_table(alone).rows] == [("set 1", "foreseen"), ("set 4", "foreseen")]
+    assert [row[:2] for row in tables.step_table(alone).rows] == [("set 1", "predicted"), ("set 4", "predicted")]
     table = tables.friction_table(alone)
-    assert table.headings == ("law", "error, at most", "foreseen", "push, no friction", "foreseen")
+    assert table.headings == ("law", "error, at most", "predicted", "push, no friction", "predicted")
     assert [len(row) for row in table.rows] == [5, 5]
 
 
@@ -174,12 +174,12 @@ def test_the_verdict_can_be_built_on_where_every_set_settles_within_the_limits(m
 def test_a_single_set_is_called_by_its_name_and_what_was_not_tried_is_said():
     one = chapter(tracking(outcome(SET_4)))
     assert "is followed by set 4 within" in one.verdict
-    assert one.detail == "Foreseen on the fitted numbers; no rig was touched."
+    assert one.detail == "Predicted with the fitted numbers; no rig was touched."
     assert [part.title for part in one.parts] == ["Gains", "Closed loop"]
     some = chapter(tracking(outcome(SET_1), outcome(SET_4, ran(), ran()), interrupted=True))
     assert some.detail == (
-        "Tried on the rig, but for what is foreseen to leave the bounds: set 1. It was interrupted; what was finished "
-        "is told."
+        "Tried on the rig, but for what is predicted to leave the bounds: set 1. It was interrupted; what was finished "
+        "is reported."
     )
 
 
@@ -192,7 +192,7 @@ def test_every_part_has_its_turn_and_says_its_numbers():
         "60 % of the twist that trips the shaft 17.2 deg."
     ) in text["Gains"]
     assert "set 1 79 %, set 4 79 %" in text["Closed loop"]
-    assert "Foreseen for set 4: 7.89 V (78.9 %); found the same." in text["Closed loop"]
+    assert "Predicted for set 4: 7.89 V (78.9 %); found the same." in text["Closed loop"]
     assert "it leaves 0.1 % of the step" in text["What friction leaves"]
     why = text["Why state feedback"]
     p = RIG.plant.parameters()
@@ -214,9 +214,9 @@ def test_what_was_predicted_to_trip_is_not_said_to_have_been_tried():
     done = whole()
     done = replace(done, far=outcome(FAR, ran(tripped=0.35)))
     why = " ".join(b for b in chapter(done).parts[-1].content if isinstance(b, str))
-    assert "was not tried; it is foreseen that it trips the rig 0.25 s after the step" in why
+    assert "was not tried; it is predicted that it trips the rig 0.25 s after the step" in why
     compared = next(b for b in chapter(done).parts[-1].content if getattr(b, "name", "") == "track-compared")
-    assert compared.caption.endswith("Foreseen, not tried: far.")
+    assert compared.caption.endswith("Predicted, not tried: far.")
 
 
 def test_numbers_are_those_of_the_runs_in_si_units():

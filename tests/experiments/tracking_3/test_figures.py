@@ -174,7 +174,7 @@ def test_poles_are_those_of_rig_model_and_request_in_the_upper_half_plane():
     for ax, law in zip(drawing.axes, (SET_1, SET_4, SUM), strict=False):
         by_name = {line.get_label(): line for line in ax.get_lines()}
         np.testing.assert_allclose(points(by_name["open loop"]), upper(RIG.linear(AT).poles()), atol=1e-9)
-        np.testing.assert_allclose(points(by_name["asked"]), upper(law.requested))
+        np.testing.assert_allclose(points(by_name["requested"]), upper(law.requested))
         np.testing.assert_allclose(points(by_name["on the fitted model, sampled and late"]), upper(law.poles))
         np.testing.assert_allclose(points(by_name["on the rig"]), upper(loop_poles(other, law.law)))
         assert ax.get_xlim()[0] == pytest.approx(1.12 * SET_4.requested.real.min())

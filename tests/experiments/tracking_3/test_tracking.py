@@ -205,7 +205,7 @@ def test_pulses_stay_within_travel_and_twist():
             for file in ("pulses.csv", "others.csv"):
                 q = pulses(rig, file).y * rig.resolution
                 assert np.abs(q).max() < rig.travel
-                assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].twist
+                assert np.abs(q[:, 0] - q[:, 1]).max() < MAKES[kind].rig.twist
 
 
 @pytest.mark.slow

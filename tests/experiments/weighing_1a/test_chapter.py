@@ -21,7 +21,7 @@ from upright.experiments.weighing_1a.run import Campaign, Weighing
 from upright.identification.loadings import Loaded, Loadings
 from upright.identification.model.fit import Estimate
 from upright.records import Record
-from upright.rig.makes import OSCILLATORS
+from upright.rig.makes import BODIES
 from upright.signals.free_swing import Decay
 
 K, BARE, RHO, DELTA = 400.0, 0.6, 0.8, 0.001
@@ -208,7 +208,7 @@ def test_loadings_are_typed_as_the_command_line_takes_them():
 
 @pytest.mark.parametrize(("tolerance", "said"), [(0.0, ""), (0.002, ' --tolerance "0.2 %"')])
 def test_a_body_of_one_s_own_is_weighed_again_from_its_logs(tolerance, said):
-    rig = SimpleNamespace(plant=OSCILLATORS["rectilinear"].plant)
+    rig = SimpleNamespace(plant=BODIES["rectilinear"].rig.plant)
     done = Weighing(rig=rig, make=None, folder=Path("w"), campaign=campaign(), known=(), tolerance=tolerance)
     page = chapter(done)
     files = " ".join(f'"w/log {i}.csv"' for i in range(4))

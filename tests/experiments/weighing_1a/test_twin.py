@@ -9,7 +9,7 @@ from upright.experiments.weighing_1a.run import drawn_twin, measure_body, step_l
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify
 from upright.physics import chain
-from upright.rig.makes import OSCILLATORS
+from upright.rig.makes import BODIES
 
 KINDS = ("rectilinear", "torsional")
 
@@ -24,8 +24,10 @@ def test_twins_are_weighed_within_one_percent(kind):
         for found, truth in ((done.loadings.k, done.on.stiffness), (done.loadings.bare, done.on.bare)):
             assert found.value == pytest.approx(truth, rel=1e-2)
             held.append(found.interval[0] <= truth <= found.interval[1])
-        assert done.loadings.damping.value == pytest.approx(done.on.truth.parameters()["c_1"], rel=1e-2)
-        assert abs(done.loadings.damping.value - done.on.truth.parameters()["c_1"]) < 4 * done.loadings.damping.stderr
+        assert done.loadings.damping.value == pytest.approx(done.on.rig.plant.parameters()["c_1"], rel=1e-2)
+        assert (
+            abs(done.loadings.damping.value - done.on.rig.plant.parameters()["c_1"]) < 4 * done.loadings.damping.stderr
+        )
     # twelve pairs that err together: fewer than nine of twelve honest 95 % intervals hold once in 400 times
     assert sum(held) >= 18
 
@@ -40,12 +42,12 @@ def test_a_log_is_what_an_encoder_shows(kind):
     assert np.array_equal(x, np.round(x))
     assert np.array_equal(x, again[name])
     assert not np.array_equal(x, step_log(on, 2, shot=2)[name])
-    make = OSCILLATORS[kind]
-    assert np.abs(record["u"]).max() <= make.limit
+    make = BODIES[kind]
+    assert np.abs(record["u"]).max() <= make.rig.limit
     # at the step's end friction holds the body within f/k of where the spring would have it
-    plant = on.truth.parameters()
-    middle = x[record["u"] > 0][-1] / make.counts
-    force = record["u"].max() * make.gain
+    plant = on.rig.plant.parameters()
+    middle = x[record["u"] > 0][-1] / make.rig.per_unit[0]
+    force = record["u"].max() * make.rig.gain
     assert abs(middle - force / on.stiffness) < 2 * 1.5 * plant["f_1c"] / on.stiffness
 
 
@@ -54,7 +56,7 @@ def test_travel_stays_within_the_rigs():
     for kind, most in (("rectilinear", 0.03), ("torsional", np.radians(25))):
         for count in range(5):
             record = step_log(drawn_twin(0, kind), count)
-            assert np.abs(record[record.outputs[0]]).max() / OSCILLATORS[kind].counts < most
+            assert np.abs(record[record.outputs[0]]).max() / BODIES[kind].rig.per_unit[0] < most
 
 
 @pytest.mark.slow
@@ -62,12 +64,12 @@ def test_travel_stays_within_the_rigs():
 def test_least_squares_on_the_whole_motion_agrees(kind):
     """The same records, the equations of motion: no peak is looked at."""
     done = measure_body(drawn_twin(5, kind))
-    make, plant = OSCILLATORS[kind], chain(1, kind)
+    make, plant = BODIES[kind], chain(1, kind)
     mass = "m_1" if kind == "rectilinear" else "J_1"
-    guess = {mass: 1.3 * done.on.bare, "k_1": 0.8 * done.on.stiffness, "c_1": 1.5 * make.plant.parameters()["c_1"]}
-    guess |= {"f_1c": 0.7 * make.plant.parameters()["f_1c"]}
+    guess = {mass: 1.3 * done.on.bare, "k_1": 0.8 * done.on.stiffness, "c_1": 1.5 * make.rig.plant.parameters()["c_1"]}
+    guess |= {"f_1c": 0.7 * make.rig.plant.parameters()["f_1c"]}
     parameters = {n: Parameter(name=n, value=v, estimate=True, lower=0.0) for n, v in guess.items()}
-    parameters["actuator.gain"] = Parameter(name="actuator.gain", value=0.9 * make.gain, estimate=True)
+    parameters["actuator.gain"] = Parameter(name="actuator.gain", value=0.9 * make.rig.gain, estimate=True)
     parameters["actuator.lag"] = Parameter(name="actuator.lag", value=2e-3)
     runs = []
     for label, record in done.logs.items():
@@ -80,7 +82,7 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
                 role="fit",
                 t=record.t,
                 u=record.u,
-                y=record.y / make.counts,
+                y=record.y / make.rig.per_unit[0],
                 measured=(name,),
                 known={"a_1": done.added[label]},
                 unknown=("initial", "offset", "friction"),
@@ -94,5 +96,5 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
 
 
 def test_a_piece_weighs_what_the_laboratory_says():
-    assert OSCILLATORS["rectilinear"].piece == 0.5
-    assert OSCILLATORS["torsional"].piece == pytest.approx(0.5 * (0.065**2 + 0.025**2 / 2))  # parallel axes
+    assert BODIES["rectilinear"].piece == 0.5
+    assert BODIES["torsional"].piece == pytest.approx(0.5 * (0.065**2 + 0.025**2 / 2))  # parallel axes

@@ -10,7 +10,7 @@ from upright.experiments.weighing_1a.chapter import chapter
 from upright.experiments.weighing_1a.from_logs import weigh_logs
 from upright.experiments.weighing_1a.run import Weighing, first_body, measure_body, run_weighing
 from upright.records import Record
-from upright.rig.makes import MAKES, OSCILLATORS, make_rig
+from upright.rig.makes import BODIES, MAKES, make_rig
 
 
 @pytest.mark.parametrize("make", MAKES)
@@ -36,7 +36,7 @@ def test_what_is_handed_on_is_the_rig_s(make, tmp_path):
 def test_a_rig_of_another_kind_is_refused(tmp_path):
     rig = make_rig("rectilinear")
     with pytest.raises(BadInput, match="knows carts, disks and pendulums"):
-        run_weighing(TwinStand(rig=rig.replace(plant=OSCILLATORS["torsional"].plant, counts=(1.0,))), 0, tmp_path)
+        run_weighing(TwinStand(rig=rig.replace(plant=BODIES["torsional"].rig.plant, counts=(1.0,))), 0, tmp_path)
 
 
 def test_the_chapter_says_how_far_a_number_is_off_and_whether_its_interval_covers_it(tmp_path):

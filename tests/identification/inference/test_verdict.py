@@ -81,7 +81,7 @@ def test_a_fifth_of_a_swing_tells_no_friction_and_is_not_trusted() -> None:
     fit = identify(rig(Pendulum, PENDULUM, guesses), [run])
     assert min(fit.runs["swing"].fit_percent.values()) > 95
     assert not fit.trusted
-    assert "No number asked is determined well" in fit.verdict or "cannot see" in fit.verdict
+    assert "No estimated number is determined well" in fit.verdict or "cannot see" in fit.verdict
 
 
 def test_a_bound_that_excludes_the_truth_is_not_trusted() -> None:

@@ -144,7 +144,7 @@ def test_an_interrupted_search_is_judged_on_its_prediction_alone() -> None:
     assert bad.answer == "no"
     assert bad.reasons[:2] == (
         "Not evaluated: interrupted. This is from the best so far.",
-        "No number asked is determined well, so others would explain the runs as well.",
+        "No estimated number is determined well, so others would explain the runs as well.",
     )
 
 
@@ -197,7 +197,7 @@ def test_all_numbers_can_be_used_and_none_was_asked() -> None:
     assert (told.answer, told.advice) == ("yes", "")
     assert told.headline == "All numbers can be used: J_p, b_2. Each is known to 5 % or better."
     nothing = judged(estimates={"m_p": firm(status="known"), "b_2": firm(status="left out")})[1]
-    assert (nothing.answer, nothing.headline) == ("yes", "Nothing was asked.")
+    assert (nothing.answer, nothing.headline) == ("yes", "Nothing was estimated.")
 
 
 WEAK = {"status": "poorly determined", "unit": "kg m^2"}
@@ -284,7 +284,7 @@ def test_numbers_bent_by_a_dead_time_are_not_used() -> None:
     some, all_ = (judged(estimates=e, bent=bent)[1] for bent in (("J_p",), ("J_p", "b_2")))
     assert (some.answer, some.headline) == ("in part", "These numbers can be used: b_2. It is known to 5 % or better.")
     assert some.reasons[0].startswith("J_p: outside their intervals once the drive may act late")
-    assert (all_.answer, all_.headline) == ("no", "None of them before the drive's delay is asked for.")
+    assert (all_.answer, all_.headline) == ("no", "None of them before the drive's delay is estimated.")
 
 
 @pytest.mark.parametrize(

@@ -327,7 +327,7 @@ def said(fit, **more):
 
 def test_a_fit_that_ran_away_has_one_thing_to_do(changed):
     (only,) = said(changed(failed=True))
-    assert only.startswith("Nothing else can be said before the simulated motion stays finite")
+    assert only.startswith("Nothing else is known before the simulated motion stays finite")
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ REFUSED = {
     "try:\n    x = 1\nfinally:\n    x = 2": ("'try' is not known", 1),
     "x = 1\nif x > 0:\n    y = lambda: 2": ("is more than numbers", 3),
     "x, y = (1, 2, 3)": ("as many names as numbers", 1),
-    "x = (1, 2)\nOUT[0] = x[2]": ("number 2 is asked of a tuple of 2", 2),
+    "x = (1, 2)\nOUT[0] = x[2]": ("number 2 is read from a tuple of 2", 2),
     "OUT[0] = (1, 2)": ("a tuple stands where a number is needed", 1),
     "OUT[0] = OUT": ("an array stands where a number is needed", 1),
     "for x in OUT:\n    pass": ("a for runs over range(...) or over a tuple", 1),

@@ -38,7 +38,7 @@ def test_numbers_may_wear_their_unit_and_their_uncertainty() -> None:
 
 
 def test_what_is_asked_and_known_at_once_is_a_sentence() -> None:
-    with pytest.raises(BadInput, match="'m_p' cannot be known and asked at once"):
+    with pytest.raises(BadInput, match="'m_p' cannot be known and estimated at once"):
         study_of_record(swung(), Pendulum, known={"m_p": 0.2, "l_cg": 0.3}, ask=["m_p"])
 
 
@@ -80,9 +80,9 @@ def test_what_the_draft_asks_is_asked_where_nobody_says_otherwise() -> None:
     [
         ({"known": {"zeta": 1}}, "Pendulum has no number 'zeta'"),
         ({"known": KNOWN, "ask": ["zeta"]}, "Pendulum has no number 'zeta'"),
-        ({"known": {"m_p": 1}, "ask": ["b_2"]}, 'needs l_cg, neither known nor asked; measure and pass known={"l_cg"'),
-        ({"known": KNOWN, "ask": ["b_2s"]}, 'b_2s is asked and no guess of it can be read from the log; pass ask={'),
-        ({"known": KNOWN, "ask": ["actuator.delay"]}, "actuator.delay is asked and no guess"),
+        ({"known": {"m_p": 1}, "ask": ["b_2"]}, 'needs l_cg, neither known nor estimated; measure and pass'),
+        ({"known": KNOWN, "ask": ["b_2s"]}, 'b_2s is to be estimated and no guess of it can be read'),
+        ({"known": KNOWN, "ask": ["actuator.delay"]}, "actuator.delay is to be estimated and no guess"),
         ({"columns": {"theta": "angle"}}, "no column 'angle'"),
         ({"units": {"phi": "rad"}}, "units names columns, got 'phi'"),
     ],

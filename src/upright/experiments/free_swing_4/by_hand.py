@@ -81,4 +81,4 @@ def _window(stand: TestStand, log: Record) -> tuple[float, float]:
 
 def carrier_of(stand: TestStand) -> str:
     """Inertia of the body that carries the pendulum; empty where no make has such a plant."""
-    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(stand.rig.plant, type(m.plant))), "")
+    return next((m.body for m in MAKES.values() if m.pendulum and isinstance(stand.rig.plant, type(m.rig.plant))), "")

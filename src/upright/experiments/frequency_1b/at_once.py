@@ -64,7 +64,7 @@ def asking(stand: TestStand) -> Asking:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
             raise BadInput(
-                f"{model.name} does not swing about '{at}', and the band of frequencies it is asked is told from its "
+                f"{model.name} does not swing about '{at}', and the band of its excitation follows from its "
                 "swings; log a step of it instead (upright run --excite), and fit that (upright identify)."
             )
         band = (BELOW * min(swings), ABOVE * max(swings))

@@ -49,7 +49,7 @@ def chapter(result: FrequencyRun) -> Chapter:
         f"interval. {_simplex_sentence(answer)}",
         sound=answer.fit.trusted,
         parts=(
-            Part("What was asked", (*_campaign(result), _quality_picture(answer.data))),
+            Part("Excitation", (*_campaign(result), _quality_picture(answer.data))),
             *_answer_parts(answer, truth=result.truth, known=_bench(result)),
         ),
         steps=_steps(result),
@@ -64,7 +64,7 @@ def log_chapter(result: LoggedResponse) -> Chapter:
     data, answer = result.response, result.answer
     span = f"{data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s"
     sources = f"{len(data)} frequencies from {span} in {', '.join(result.sources)}."
-    source_part = Part("What was asked", (sources, *data.notes, _quality_picture(data)))
+    source_part = Part("Excitation", (sources, *data.notes, _quality_picture(data)))
     fit = typed(result.folder / "fit.json")
     if answer is not None:
         return Chapter(
@@ -149,7 +149,7 @@ def _campaign(result: FrequencyRun) -> tuple[str, ...]:
         late = settle.size - waited.size
         rest = f"; {late} had not settled after 40 s, and what beats there counts as their error" if late else ""
         sentences.append(
-            "Each sine was awaited until what was left of its transient, told from the data, had died away: "
+            "Each sine ran until its transient, estimated from the data, had decayed: "
             f"{waited.min():.0f} to {waited.max():.0f} s{rest}."
         )
     else:

@@ -161,7 +161,7 @@ def quality_figure(data: FrequencyResponse) -> Figure:
             _whole_decades(axes)
         else:
             axes.set_yticks([])
-            axes.text(0.5, 0.5, "not told by a sweep", transform=axes.transAxes, ha="center", color=GREY)
+            axes.text(0.5, 0.5, "not measured by a sweep", transform=axes.transAxes, ha="center", color=GREY)
     panels[0, 0].legend(loc="best")
     panels[1, 1].plot(data.omega, np.abs(data.drive), "x", color=BLACK, markersize=4,
                       label=f"command [{unit(data.units[-1])}]" if unit(data.units[-1]) else "command")  # fmt: skip

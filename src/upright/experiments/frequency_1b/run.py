@@ -211,7 +211,7 @@ def response_of_logs(
 def _designed(request: LogRequest) -> GreyBox:
     """Numbers of a make: nominal where not specified, known within a tolerance where a bench usually measures them."""
     make = make_named(request.make)
-    values = make.plant.parameters()
+    values = make.rig.plant.parameters()
     for name in request.known:
         if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):
             raise BadInput(f"'{request.make}' has no number '{name}'; {nearest(name, values)}")

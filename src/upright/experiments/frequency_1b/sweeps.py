@@ -205,7 +205,7 @@ def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
         Of the phases.
     """
     if kind not in ("multisine", "sweep"):
-        raise BadInput(f"a rig is asked by 'sines', a 'multisine' or a 'sweep', not by '{kind}'.")
+        raise BadInput(f"a rig is excited by 'sines', a 'multisine' or a 'sweep', not by '{kind}'.")
     tick, (low, high) = rig.period * EVERY, make.band
     if kind == "multisine":
         base = 2 * math.pi / (LENGTH * tick)
@@ -247,7 +247,7 @@ def _expected(make: Make, omega: ArrayLike) -> Array:
 
 def _level(make: Make, omega: ArrayLike) -> Array:
     """Relative command at each frequency: as much as the most mobile coordinate stands."""
-    return np.minimum(make.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
+    return np.minimum(make.rig.limit, np.min(np.array(make.reach) / _expected(make, omega), axis=1))
 
 
 def _moved(rig: Rig, u: Array) -> Array:

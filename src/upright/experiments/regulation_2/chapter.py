@@ -10,6 +10,7 @@ from upright.control import Score
 from upright.control.effort import FELT, RestEffort, of_limit, shown
 from upright.control.preflight import BUSY, SATURATED, STABILISED, WORDS, word
 from upright.control.score import effort_at_rest
+from upright.designing.run import Designed, DesignRequest, design_for
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import DRAWS, SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
@@ -87,6 +88,18 @@ def _recommended(result: Regulation) -> str:
         f"Use {best.name}: it stabilises {_of_rigs(result, share)} without saturation; on 95 % of them the command at "
         f"rest has an rms of {of_limit(best.before.rest_rms, 'at most ')}."
     )
+
+
+def design_of_best(result: Regulation) -> Designed | None:
+    """The recommended set as a design, of the loop that was predicted; None where no set is recommended."""
+    best, rig, request = result.best, result.rig, result.request
+    if not best.before.basis.supports or best.before.words[STABILISED] < 0.5:
+        return None
+    return design_for(rig, DesignRequest(
+        at=result.task.at, poles=best.placement.requested, period=rig.period, delay=rig.delay / rig.period,
+        speed=request.speed, memory=request.memory, resolution=tuple(rig.resolution.tolist()),
+        limit=rig.saturation if math.isfinite(rig.saturation) else None, start=result.task.start, on=rig,
+    ))  # fmt: skip
 
 
 def _of_rigs(result: Regulation, share: float) -> str:
@@ -284,7 +297,7 @@ def _way_table(result: Regulation) -> Table:
 def _parts(result: Regulation) -> list[Part]:
     tilt, push = math.degrees(result.task.start[2]), result.task.start[3]
     rig = result.rig
-    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "steps that nobody stated"
+    steps = f"steps of {1e3 * rig.converter:.2g} m{rig.unit}" if rig.converter else "unspecified steps"
     sources = (
         f"{rig.name}, sampled every {1e3 * rig.period:.3g} ms; the command has a limit of {rig.limit:g} {rig.unit}, "
         f"{steps}, and acts {1e3 * rig.delay:.2g} ms late with a lag of "

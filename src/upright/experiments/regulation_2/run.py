@@ -212,7 +212,7 @@ def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
     request = RegulationRequest(tilt=tilt, push=push, seconds=SECONDS_BY_HAND)
     if stand.make is not None:
         return request
-    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].plant)]
+    falls = [float(p.linear("inverted").poles().real.max()) for p in (known.plant, MAKES["furuta"].rig.plant)]
     faster = falls[0] / falls[1]
     return replace(request, poles={f"{name} x{faster:.2g}": faster * p for name, p in request.poles.items()})
 

@@ -34,9 +34,9 @@ def bench(rig: Rig, make: Make) -> dict[str, float]:
 
 def model_of(make: Make, known: Mapping[str, float], tolerance: Mapping[str, float]) -> GreyBox:
     """What a fit may know about a rig of a make: the design's numbers as guesses, and what is known, how well."""
-    design, plant = make_rig(make.key), type(make.plant)
+    design, plant = make_rig(make.key), type(make.rig.plant)
     parameters: dict[str, Parameter] = {}
-    for name, value in make.plant.parameters().items():
+    for name, value in make.rig.plant.parameters().items():
         weighed, what = name in known, plant.quantity(name)
         parameters[name] = Parameter(
             name=name, unit=what.unit, meaning=what.meaning, value=known.get(name, value), lower=0.0,
@@ -44,7 +44,7 @@ def model_of(make: Make, known: Mapping[str, float], tolerance: Mapping[str, flo
             uncertainty=tolerance.get(name, 0.0) * known[name] if weighed else 0.0,
         )  # fmt: skip
     for name, value, unit, sought, meaning in (
-        ("actuator.gain", make.gain, make.gain_unit, True, "force per unit of command"),
+        ("actuator.gain", make.rig.gain, make.gain_unit, True, "force per unit of command"),
         ("actuator.delay", design.delay, "s", False, "dead time"),
         ("actuator.lag", LAG, "s", True, "first-order lag"),
     ):

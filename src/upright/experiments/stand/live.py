@@ -76,7 +76,7 @@ class LiveStand(TestStand):
     def ask(self, sentence: str) -> None:
         """Ask the person beside it; see `TestStand.ask`."""
         if not self.person(sentence):
-            raise RigStopped(f"This was asked for and not done: {sentence}")
+            raise RigStopped(f"This was requested and not done: {sentence}")
 
     def run(
         self, samples: Sequence[float], folder: Path, stem: str, *, lifted: float = 0.0, bolted: float = 0.0
@@ -180,9 +180,7 @@ def live_stand(
     library()
     file = read_rig_file(path)
     if file.performed == REPLAYED:
-        raise BadInput(
-            f'{path}: a replay answers nothing that is asked of it; experiments need a rig or kind = "twin".'
-        )
+        raise BadInput(f'{path}: a replay does not answer commands; experiments need a rig or kind = "twin".')
     rig, truth = described(file)
     units = {c.name: c.unit for c in rig.plant.coordinates}
     limits = file.limits(units, rig.unit, usual_limits(rig))

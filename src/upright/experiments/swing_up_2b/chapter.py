@@ -24,7 +24,7 @@ QUESTION = (
 
 def chapter(result: SwingUpRun) -> Chapter:
     """Sensors, swing-up, lies; as far as the experiment has them."""
-    source = "numbers identified hanging" if result.source else "the numbers of the make as designed"
+    source = "numbers identified hanging" if result.source else "the nominal numbers of the rig model"
     seed = "" if result.truth is result.model else f", seed {result.truth.seed}"
     parts = [_sensor_part(result.model, result.check)]
     if result.ascent is not None:
@@ -43,7 +43,7 @@ def chapter(result: SwingUpRun) -> Chapter:
 
 def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
     """What a log of a hanging rig says of its encoders, by itself."""
-    again = Step("Mend what is said above, log the hanging rig again, and check again.")
+    again = Step("Mend what is reported above, log the hanging rig again, and check again.")
     onward = Step("The encoders may be trusted: find the gains that hold the rig.",
                   f"upright regulate {source}")  # fmt: skip
     page = Chapter(
@@ -136,7 +136,7 @@ def _lie_part(result: SwingUpRun) -> Part:
         f"A loop started {math.degrees(TILT):.0f} degrees from upright falls with {len(falling)} of them; a watch "
         f"beside it switches off before the fall in {in_time} cases."
     )
-    return Part("If an encoder lied", (Points((sentence,)), table))
+    return Part("If an encoder were faulty", (Points((sentence,)), table))
 
 
 def _row(lie: Lie) -> tuple[str, ...]:

@@ -18,9 +18,10 @@ from upright.basis import SIMULATED
 from upright.control import SwingUp, design_swing_up, trial
 from upright.control.effort import RestEffort, rest_effort, shown
 from upright.control.score import FALLEN
-from upright.control.sensors import KNOWN, Scales, Suspicion, Watch, probe, scales, shown_by_encoders
+from upright.control.sensors import KNOWN, Scales, probe, scales, shown_by_encoders
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import readings
+from upright.control.watch import Suspicion, Watch
 from upright.errors import BadInput, NotIdentifiable, RigStopped, nearest
 from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.gains import feedback, filtered

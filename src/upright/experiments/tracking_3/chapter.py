@@ -38,13 +38,13 @@ def chapter(result: Tracking) -> Chapter:
         parts.append(_friction(result, far))
     if result.pd is not None and result.stiff is not None and result.far is not None:
         parts.append(_why(result, result.pd, result.stiff, result.far, near, far))
-    ended = " It was interrupted; what was finished is told." if result.interrupted else ""
-    detail = "Foreseen on the fitted numbers; no rig was touched."
+    ended = " It was interrupted; what was finished is reported." if result.interrupted else ""
+    detail = "Predicted with the fitted numbers; no rig was touched."
     if result.tried:
         left = [o.law.name for o in result.outcomes if not o.tried]
         detail = "Seen on the twin: no rig was touched." if result.simulated else "Tried on the rig."
         if left:
-            detail = f"Tried on the rig, but for what is foreseen to leave the bounds: {', '.join(left)}."
+            detail = f"Tried on the rig, but for what is predicted to leave the bounds: {', '.join(left)}."
     page = Chapter(
         key="3", title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
@@ -197,8 +197,8 @@ def _gains(result: Tracking, far: str) -> Part:
             tables.shaft_pole_table(result),
             Picture(
                 name="track-poles", draw=lambda: poles_figure(result),
-                caption="Poles asked (rings), of the sampled, late loop on the fitted model (+) and on the rig (x). "
-                "Delay and differences move the fast poles; the flexible mode stays where it was asked.",
+                caption="Poles requested (rings), of the sampled, late loop on the fitted model (+) and the rig (x). "
+                "Delay and differences move the fast poles; the flexible mode stays where it was requested.",
                 description="Upper half of the s-plane for every set.",
             ),
         ),
@@ -224,7 +224,7 @@ def _loop(result: Tracking, near: str, far: str) -> Part:
     sentence = f"Largest command, of the drive's limit: {shares}."
     if result.tried:
         sentence += (
-            f" Foreseen for {best.law.name}: "
+            f" Predicted for {best.law.name}: "
             f"{best.predicted.effort.peak:.3g} {result.rig.unit} ({percentage(best.predicted.effort.share)}); found "
             + ("the same." if off < 5e-4 else f"{best.measured.effort.peak:.3g} {result.rig.unit}.")
         )
@@ -280,9 +280,9 @@ def _why(result: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near
     trips = other_end.measured.tripped
     end = f"trips the rig {trips - BEFORE:.2g} s after the step" if math.isfinite(trips) else "does not trip the rig"
     if result.tried and not other_end.tried:
-        end = f"was not tried; it is foreseen that it {end}"
+        end = f"was not tried; it is predicted that it {end}"
     guessed = [o.law.name for o in compared if result.tried and not o.tried]
-    foreseen = f" Foreseen, not tried: {', '.join(guessed)}." if guessed else ""
+    foreseen = f" Predicted, not tried: {', '.join(guessed)}." if guessed else ""
     tried = 0 if result.search is None else result.search.kp.size
     return Part(
         "Why state feedback",

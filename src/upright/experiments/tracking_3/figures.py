@@ -119,7 +119,7 @@ def poles_figure(result: Tracking) -> Figure:
         s_plane(ax)
         on_rig = loop_poles(result.rig, law.law)
         kinds = (
-            ("open loop", open_loop, "x", GREY, 6), ("asked", law.requested, "o", BLACK, 9),
+            ("open loop", open_loop, "x", GREY, 6), ("requested", law.requested, "o", BLACK, 9),
             ("on the fitted model, sampled and late", law.poles, "+", BLUE, 9),
             ("on the rig", on_rig, "x", VERMILLION, 6),
         )  # fmt: skip

@@ -89,15 +89,15 @@ def shaft_study(rig: Rig, seed: int, weighed: Sequence[Known] = ()) -> str:
     rng = np.random.default_rng([seed, 30])
     known = {k.name: k for k in weighed if k.name == make.body}
     parameters = TomlTable("[parameters]")
-    for name, value in make.plant.parameters().items():
-        unit = make.plant.quantity(name).unit
+    for name, value in make.rig.plant.parameters().items():
+        unit = make.rig.plant.quantity(name).unit
         if name in known:
             text, error = with_unit(known[name].value, unit, 6), with_unit(known[name].stderr, unit, 2)
             parameters.key(name, {"value": text, "uncertainty": error}, "experiment 1a")
         elif value:
             parameters.key(name, {"guess": with_unit(value * rng.choice([0.7, 1.3]), unit, 4), "min": 0})
     actuator = TomlTable("[actuator]", "the loop's poles do not depend on the gain, masses and springs do")
-    gain = with_unit(make.gain, make.gain_unit, 6)
+    gain = with_unit(make.rig.gain, make.gain_unit, 6)
     actuator.key("gain", {"guess": gain, "min": 0} if known else {"value": gain, "uncertainty": GAIN_ERROR})
     actuator.key("delay", with_unit(1e3 * rig.delay, "ms", 6))
     actuator.key("lag", with_unit(1e3 * rig.lag, "ms", 6))

@@ -305,12 +305,12 @@ def choose_step(model: Rig, laws: Sequence[Tracker], step: float | None = None) 
     digits = 10.0 ** (math.floor(math.log10(size)) - 1)
     size = float(f"{math.floor(size / digits + 1e-9) * digits:.2g}")
     if step is not None:
-        size, reason = step, "as asked"
+        size, reason = step, "as requested"
     return Chosen(size=size, reason=reason, by_effort=most, by_twist=twist, by_travel=travel)
 
 
 def _times_as_fast(model: Rig) -> float:
-    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).plant)]
+    swings = [float(p.linear(AT).poles().imag.max()) for p in (model.plant, make_of(model.plant).rig.plant)]
     return swings[0] / swings[1]
 
 

@@ -63,9 +63,9 @@ def shaft_pole_table(result: Tracking) -> Table:
         for o in tried_laws(result)
     ]
     return Table(
-        caption="Poles [1/s]: asked for, and of the loop with held, late commands and filtered differences, "
+        caption="Poles [1/s]: requested, and of the loop with held, late commands and filtered differences, "
         "those left out that die within three samples",
-        headings=("law", "asked", "as it runs, on the fitted model"), rows=tuple(rows),
+        headings=("law", "requested", "as it runs, on the fitted model"), rows=tuple(rows),
     )  # fmt: skip
 
 
@@ -73,7 +73,7 @@ def step_table(result: Tracking) -> Table:
     """Step figures, predicted on the fitted model and measured on the rig."""
     rows: list[tuple[str, ...]] = []
     for o in tried_laws(result):
-        both = (("foreseen", o.predicted), ("found", o.measured)) if result.tried else (("foreseen", o.predicted),)
+        both = (("predicted", o.predicted), ("measured", o.measured))[: 1 + result.tried]
         rows += [(o.law.name if what == both[0][0] else "", what, *_figures(run)) for what, run in both]
     return Table(
         caption=f"A step of {length(result, result.step.size)} of the far body: rise 10 to 90 %, overshoot, time of "
@@ -99,7 +99,7 @@ def _figures(run: StepTrial) -> tuple[str, ...]:
 def friction_table(result: Tracking) -> Table:
     """What dry friction leaves at rest, and how far a steady push moves the far body."""
     size = result.step.size
-    columns = ("foreseen", "found") if result.tried else ("foreseen",)
+    columns = ("predicted", "measured")[: 1 + result.tried]
     rows: list[tuple[str, ...]] = []
     for o in tried_laws(result):
         runs = (o.predicted, o.measured)[: len(columns)]

@@ -17,7 +17,7 @@ from upright.records import Record
 from upright.report.fit.tables import finding, interval, plain_estimate
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import number, typed, unit, with_error
-from upright.rig.makes import OSCILLATORS, Make
+from upright.rig.makes import BODIES, Make
 
 QUESTION = (
     "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "
@@ -30,7 +30,7 @@ MOST_PANELS = 6
 def chapter(result: Weighing) -> Chapter:
     """Experiment 1a on a rig, beside the truth of a twin."""
     campaign = result.campaign
-    loadings, body = campaign.loadings, OSCILLATORS[campaign.kind]
+    loadings, body = campaign.loadings, BODIES[campaign.kind]
     page = loading_chapter(
         loadings, kind=campaign.kind, title="Stiffness and inertia from added loads", logs=campaign.logs,
         signals={label: record.outputs[0] for label, record in campaign.logs.items()}, left_out=campaign.left_out,
@@ -67,7 +67,7 @@ def _later_chapter(result: Weighing, make: Make, weighed: Chapter) -> Chapter:
         f"{len(campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
         "friction, encoder counts and converter steps are as on the rig."
     )
-    named = (("k", loadings.k), (OSCILLATORS[campaign.kind].bare, loadings.bare), ("c", loadings.damping))
+    named = (("k", loadings.k), (BODIES[campaign.kind].bare, loadings.bare), ("c", loadings.damping))
     handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(result, k)} for k in result.known}
     return replace(
         weighed,
@@ -107,7 +107,7 @@ def _sentence(result: Weighing, k: Known) -> str:
 
 
 def _steps(result: Weighing) -> tuple[Step, ...]:
-    campaign, body = result.campaign, OSCILLATORS[result.campaign.kind]
+    campaign, body = result.campaign, BODIES[result.campaign.kind]
     if result.make is not None:
         first = [label for label in campaign.files if label.endswith("run 1")]
         files = " ".join(typed(result.folder / campaign.files[label]) for label in first)
@@ -117,7 +117,7 @@ def _steps(result: Weighing) -> tuple[Step, ...]:
                 "Weigh the body again from one log of each loading, as you would your own.",
                 f"upright loadings {files} {added} -o {typed(result.folder / 'again')}",
             ),
-            Step("See which masses would have told most.", f"upright plan-inertias --rig {campaign.kind}"),
+            Step("See which masses are most informative.", f"upright plan-inertias --rig {campaign.kind}"),
         )
     files = " ".join(typed(result.folder / file) for file in campaign.files.values())
     added = added_options(campaign, campaign.files)
@@ -132,7 +132,7 @@ def _steps(result: Weighing) -> tuple[Step, ...]:
 
 def added_options(campaign: Campaign, labels: Iterable[str]) -> str:
     """Loadings of some logs as the command line takes them."""
-    return " ".join(f'--added "{campaign.added[n]:.6g} {OSCILLATORS[campaign.kind].unit}"' for n in labels)
+    return " ".join(f'--added "{campaign.added[n]:.6g} {BODIES[campaign.kind].unit}"' for n in labels)
 
 
 def loading_chapter(
@@ -185,7 +185,7 @@ def _estimate_table(loadings: Loadings, kind: str, truth: Mapping[str, float]) -
     """What was found, beside the truth where a twin tells it."""
     named = (
         ("k", "stiffness", loadings.k, "stiffness"),
-        (OSCILLATORS[kind].bare, "inertia of the bare body", loadings.bare, "inertia"),
+        (BODIES[kind].bare, "inertia of the bare body", loadings.bare, "inertia"),
         ("c", "viscous friction", loadings.damping, "damping"),
     )
     rows = tuple(
@@ -253,5 +253,5 @@ def _swing_pictures(loadings: Loadings, logs: Mapping[str, Record], signals: Map
 
 
 def _unit(kind: str, what: str) -> str:
-    body = OSCILLATORS[kind]
-    return body.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit
+    body = BODIES[kind]
+    return body.rig.plant.quantity({"inertia": body.inertia, "stiffness": "k_1", "damping": "c_1"}[what]).unit

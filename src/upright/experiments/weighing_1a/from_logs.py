@@ -12,7 +12,7 @@ from upright.experiments.weighing_1a.run import drawn_twin, measure_body
 from upright.identification.loadings import Loadings
 from upright.records import Record
 from upright.report.page import Chapter, Step
-from upright.rig.makes import OSCILLATORS
+from upright.rig.makes import BODIES
 
 
 def weigh_logs(
@@ -61,7 +61,7 @@ def weigh_logs(
         ),
         Step(
             "Plan the next loadings with the error of a frequency that these swings show.",
-            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {OSCILLATORS[kind].unit}"',
+            f'upright plan-inertias --rig {kind} --bare "{weighed.bare.value:.4g} {BODIES[kind].unit}"',
         ),
     ]
     page = loading_chapter(weighed, kind=kind, title="Stiffness and bare inertia from added loads", logs=records,
@@ -71,13 +71,13 @@ def weigh_logs(
 
 def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Chapter]:
     """The same of a twin that is stepped here; its logs go into the folder, where one is named."""
-    if kind not in OSCILLATORS:
-        raise BadInput(f"--twin is {' or '.join(OSCILLATORS)}, got '{kind}'.")
+    if kind not in BODIES:
+        raise BadInput(f"--twin is {' or '.join(BODIES)}, got '{kind}'.")
     result = measure_body(drawn_twin(seed, kind))
     column = next(iter(result.logs.values())).outputs[0]
     result = result if folder is None else result.written(folder)
     files = result.files
-    steps = [Step("See which masses would have told most.", f"upright plan-inertias --rig {kind}")]
+    steps = [Step("See which masses are most informative.", f"upright plan-inertias --rig {kind}")]
     if files:
         again = f"upright loadings {' '.join(files.values())} {added_options(result, files)}"
         steps.insert(0, Step("Weigh the rig again from its logs in that folder, as you would your own.", again))

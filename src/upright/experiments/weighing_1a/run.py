@@ -29,7 +29,7 @@ from upright.progress import Progress, silent
 from upright.records import Record
 from upright.records.record import of_twin
 from upright.rig import Rig
-from upright.rig.makes import CONVERTER, OSCILLATORS, SERVO, Make, Oscillator, make_of
+from upright.rig.makes import BODIES, BodyOnSpring, Make, make_of
 
 PIECES = 4  # 500 g masses that come with a rig
 EVERY = 4  # servo periods per logged sample
@@ -42,73 +42,75 @@ PROBE = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadedTwin:
-    """One body on a spring: its true numbers, its true added pieces [kg or kg m^2], and the seed they come from."""
+class LoadedRig:
+    """The true rig of a body on its spring, with the added inertias that its pieces truly have [kg or kg m^2]."""
 
-    design: Oscillator
-    truth: Plant
+    body: BodyOnSpring
+    rig: Rig
     pieces: tuple[float, ...]
-    seed: int
 
     @property
     def bare(self) -> float:
         """True inertia without additions."""
-        return self.truth.parameters()[self.design.inertia]
+        return self.rig.plant.parameters()[self.body.inertia]
 
     @property
     def stiffness(self) -> float:
         """True stiffness."""
-        return self.truth.parameters()["k_1"]
+        return self.rig.plant.parameters()["k_1"]
 
 
-def drawn_twin(seed: int = 0, kind: str = "rectilinear") -> LoadedTwin:
+def drawn_twin(seed: int = 0, kind: str = "rectilinear") -> LoadedRig:
     """A twin of a kind; inertias and springs differ by some percent, friction by a fifth, pieces by their tolerance.
 
     Seed 0 is the rig as designed.
     """
-    design = OSCILLATORS[kind]
+    body = BODIES[kind]
     if seed == 0:
-        return LoadedTwin(design=design, truth=design.plant, pieces=(design.piece,) * PIECES, seed=0)
+        return LoadedRig(body=body, rig=body.rig, pieces=(body.piece,) * PIECES)
     rng = np.random.default_rng([seed, 10, kind == "torsional"])
-    spread = {design.inertia: 0.04, "k_1": 0.06, "c_1": 0.2, "f_1c": 0.2}
-    values = design.plant.parameters()
-    truth = design.plant.replace(**{n: values[n] * math.exp(rng.normal(0, s)) for n, s in spread.items()})
-    pieces = tuple((design.piece * (1 + design.tolerance * rng.normal(size=PIECES))).tolist())
-    return LoadedTwin(design=design, truth=truth, pieces=pieces, seed=seed)
+    spread = {body.inertia: 0.04, "k_1": 0.06, "c_1": 0.2, "f_1c": 0.2}
+    values = body.rig.plant.parameters()
+    rig = replace(body.rig.changed(**{n: values[n] * math.exp(rng.normal(0, s)) for n, s in spread.items()}), seed=seed)
+    pieces = tuple((body.piece * (1 + body.tolerance * rng.normal(size=PIECES))).tolist())
+    return LoadedRig(body=body, rig=rig, pieces=pieces)
 
 
-def step_log(on: LoadedTwin, count: int, *, shot: int = 0, seconds: float = 3.0) -> Record:
+def step_log(on: LoadedRig, count: int, *, shot: int = 0, seconds: float = 3.0) -> Record:
     """Log of a step of the command and of its end, with `count` masses added; counts and volts.
 
     Friction differs by 13 % from run to run, and the body starts from wherever friction held it.
     """
     from upright.simulation import simulate
 
-    design = on.design
-    rng = np.random.default_rng([on.seed, 11, design.kind == "torsional", count, shot])
-    friction = on.truth.parameters()["f_1c"] * math.exp(rng.normal(0, 0.13))
-    plant = on.truth.replace(a_1=sum(on.pieces[:count]), f_1c=friction)
+    rig = on.rig
+    rng = np.random.default_rng([rig.seed, 11, on.body.kind == "torsional", count, shot])
+    friction = rig.plant.parameters()["f_1c"] * math.exp(rng.normal(0, 0.13))
+    plant = rig.plant.replace(a_1=sum(on.pieces[:count]), f_1c=friction)
     held = friction / on.stiffness
-    half = round(seconds / SERVO / EVERY)
+    half = round(seconds / rig.period / EVERY)
     command = np.zeros(2 * half + 1)
-    command[: half + 1] = round(design.step / CONVERTER) * CONVERTER
+    command[: half + 1] = round(on.body.step / rig.converter) * rig.converter
     start = plant.state() + np.array([rng.uniform(-0.5, 0.5) * held, 0.0])
-    drive = {"actuator.gain": design.gain, "actuator.limit": design.limit, "actuator.lag": 2e-3}
-    x = simulate(plant, drive, start, np.repeat(command, EVERY), SERVO, samples=command.size, every=EVERY)[:, 0, 0]
+    drive = {n: v for n, v in rig.drive.items() if n != "actuator.delay"}  # its steps begin when they begin
+    x = simulate(
+        plant, drive, start, np.repeat(command, EVERY), rig.period,
+        samples=command.size, every=EVERY,
+    )[:, 0, 0]  # fmt: skip
     column = plant.coordinates[0].name
     return Record(
-        t=np.arange(command.size, dtype=np.float64) * (SERVO * EVERY),
-        signals={"u": command, column: np.round((x - x[0]) * design.counts)},
+        t=np.arange(command.size, dtype=np.float64) * (rig.period * EVERY),
+        signals={"u": command, column: np.round((x - x[0]) * rig.per_unit[0])},
         units={"u": "V", column: "counts"},
         inputs=("u",),
         outputs=(column,),
-        provenance=of_twin(f"a {design.kind} rig", on.seed),
+        provenance=of_twin(rig.name, rig.seed),
     )
 
 
-def twin_truth(on: LoadedTwin) -> dict[str, float]:
+def twin_truth(on: LoadedRig) -> dict[str, float]:
     """What only a twin can tell, by the symbols of the report."""
-    return {"k": on.stiffness, on.design.bare: on.bare, "c": on.truth.parameters()["c_1"]}
+    return {"k": on.stiffness, on.body.bare: on.bare, "c": on.rig.plant.parameters()["c_1"]}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +131,7 @@ class Campaign:
         What only a twin can tell, by the symbols of the report; empty of hardware.
     files : dict of str to str
         Names of the logs, by label, where they were written.
-    on : LoadedTwin or None
+    on : LoadedRig or None
         The body itself, where it is simulated.
     """
 
@@ -140,7 +142,7 @@ class Campaign:
     left_out: tuple[str, ...]
     truth: Mapping[str, float]
     files: Mapping[str, str] = field(default_factory=dict[str, str])
-    on: LoadedTwin | None = None
+    on: LoadedRig | None = None
 
     def written(self, folder: Path) -> Campaign:
         """The same with every log as CSV in a folder."""
@@ -168,10 +170,10 @@ class Weighing:
 
 
 def measure_body(
-    on: LoadedTwin, progress: Progress = silent, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
+    on: LoadedRig, progress: Progress = silent, *, counts: tuple[int, ...] = (0, 1, 2, 3, 4), shots: int = 2
 ) -> Campaign:
     """Step a body with every count of masses, `shots` times each, and weigh it."""
-    design = on.design
+    design = on.body
     logs: dict[str, Record] = {}
     values: list[float] = []
     for i, count in enumerate(counts):
@@ -189,21 +191,21 @@ def measure_body(
     )  # fmt: skip
 
 
-def first_body(rig: Rig) -> LoadedTwin:
+def first_body(rig: Rig) -> LoadedRig:
     """The first body of a rig on a spring, its masses unbolted.
 
     A pendulum's cart sits between two springs, its disk below a clamped shaft; of two bodies the second is clamped, so
     that the spring is their own.
     """
     make = _make(rig)
-    design, mounted, true = make.oscillator, make.mounted, rig.plant.parameters()
+    design, mounted, true = make.on_spring, make.mounted, rig.plant.parameters()
     rng = np.random.default_rng([rig.seed, 12])
     tolerance = design.tolerance if rig.seed else 0.0
     on = mounted.each * float(np.sum(1 + tolerance * rng.normal(size=mounted.pieces)))
     on += mounted.rest + rng.normal() * mounted.rest_error * bool(rig.seed)
     spring = {"k_1": true["k_12"]} if "k_12" in true else {}
     drawn = drawn_twin(rig.seed, design.kind)
-    return replace(drawn, truth=drawn.truth.replace(**{design.inertia: true[make.body] - on}, **spring))
+    return replace(drawn, rig=drawn.rig.changed(**{design.inertia: true[make.body] - on}, **spring))
 
 
 def _make(rig: Rig) -> Make:
@@ -230,12 +232,12 @@ def run_weighing(stand: TestStand, seed: int, folder: Path, progress: Progress =
     if not stand.simulated:
         result = step_stand(stand, folder, progress)
         bare = result.loadings.bare
-        known = (Known(name=OSCILLATORS[result.kind].inertia, value=bare.value, stderr=bare.stderr),)
+        known = (Known(name=BODIES[result.kind].inertia, value=bare.value, stderr=bare.stderr),)
         return Weighing(rig=rig, make=None, folder=folder, campaign=result, known=known, tolerance=stand.tolerance)
     make = _make(rig)
     result = measure_body(first_body(replace(rig, seed=seed)), progress).written(folder)
     loadings, mounted = result.loadings, make.mounted
-    spread = make.oscillator.tolerance * mounted.each * math.sqrt(mounted.pieces)
+    spread = make.on_spring.tolerance * mounted.each * math.sqrt(mounted.pieces)
     body = Known(
         name=make.body,
         value=loadings.bare.value + mounted.each * mounted.pieces + mounted.rest,
@@ -248,7 +250,7 @@ def run_weighing(stand: TestStand, seed: int, folder: Path, progress: Progress =
 
 def kind_of(plant: Plant) -> str:
     """Whether it is one cart or one disk on a spring, which can be weighed; empty of any other."""
-    on_spring = (k for k, o in OSCILLATORS.items() if isinstance(plant, type(o.plant)))
+    on_spring = (k for k, o in BODIES.items() if isinstance(plant, type(o.rig.plant)))
     return next((k for k in on_spring if plant.parameters()["k_1"] > 0), "")
 
 
@@ -290,7 +292,7 @@ def step_stand(stand: TestStand, folder: Path, progress: Progress = silent) -> C
     loadings, left_out = weigh(
         logs, values, dict.fromkeys(logs, name), dict.fromkeys(logs, APPLIED), tolerance=stand.tolerance
     )
-    body, true = OSCILLATORS[kind], stand.truth
+    body, true = BODIES[kind], stand.truth
     truth = {"k": true["k_1"], body.bare: true[body.inertia], "c": true["c_1"]} if true else {}
     return Campaign(
         kind=kind, logs=logs, added=dict(zip(logs, values, strict=True)), loadings=loadings, left_out=left_out,
@@ -304,7 +306,7 @@ def _added(stand: TestStand) -> list[float]:
     stated = [inertia_of(text) for text in stand.added]
     if {k for _, k in stated if k} == {kind} and len({a for a, _ in stated}) > 1:
         return [a for a, _ in stated]
-    unit, piece = OSCILLATORS[kind].unit, OSCILLATORS[kind].piece
+    unit, piece = BODIES[kind].unit, BODIES[kind].piece
     raise BadInput(
         f"experiment 1a needs two or more different loadings in {unit}, such as, in RIG.toml, [loadings] "
         f'added = ["0 {unit}", "{piece:.3g} {unit}", "{2 * piece:.3g} {unit}"], got {", ".join(stand.added)}.'

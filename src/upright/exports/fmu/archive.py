@@ -64,7 +64,7 @@ def compiled_library(text: str) -> bytes | None:
             [compiler, *options, str(file), "-o", str(library), "-lm"], capture_output=True, check=False
         )  # fmt: skip
         if compiled.returncode:
-            message = (compiled.stderr.decode(errors="replace").strip() or "nothing said").splitlines()[0]
+            message = (compiled.stderr.decode(errors="replace").strip() or "no message").splitlines()[0]
             raise BadInput(
                 f"the C compiler {compiler} did not make the unit's library: {message}; does it work otherwise?"
             )

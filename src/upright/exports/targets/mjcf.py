@@ -17,7 +17,7 @@ def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     viscous = "springs, viscous friction and the drive are those of the fit" + "." * (not remarks)
     chapter = Chapter(
         title=f"{export.rig.name} for MuJoCo", verdict=f"{export.called} is written as MJCF; {viscous}"
-        + (", and what MuJoCo has otherwise is said below." if remarks else ""), warnings=remarks,
+        + (", and differences in MuJoCo are listed below." if remarks else ""), warnings=remarks,
         numbers={"remarks": list(remarks)},
         steps=(Step("Look at it.", f"pip install mujoco && python -m mujoco.viewer --mjcf={typed(file)}"),),
     )  # fmt: skip

@@ -179,14 +179,14 @@ def verdict(squares: Squares, key: tuple[str, str, Pole]) -> tuple[str, bool]:
     if squares.misfit > POOR:
         return (
             f"The model leaves {math.sqrt(squares.misfit):.1f} times the errors stated unexplained, and intervals are "
-            f"widened by that: a part of the rig is missing in it, or an encoder shows another scale than said. {text}"
+            f"widened by that: a part of the rig is missing in it, or an encoder has a wrong scale. {text}"
         ), False
     odd = max(squares.surprise, key=lambda n: abs(squares.surprise[n]), default="")
     if odd and abs(squares.surprise[odd]) > ODD:
         return (
             f"The response contradicts what is known of {odd}: it would have to be {squares.way.values[odd]:.4g}, "
             f"{abs(squares.surprise[odd]):.0f} times its tolerance away. Was it measured wrongly, or does an encoder "
-            f"show another scale than said? {text}"
+            f"have a wrong scale? {text}"
         ), False
     if 2 * squares.reached < squares.starts:
         few = f"Only {squares.reached} of {squares.starts} starts reached this minimum; there may be a lower one."

@@ -66,7 +66,7 @@ def response_of(
     hold = records[0].period if hold is None else hold
     u = records[0][command]
     if not np.ptp(u) > 0:
-        raise NotIdentifiable(f"The command '{command}' never changes, so nothing was asked; name its column.")
+        raise NotIdentifiable(f"The command '{command}' never changes, so nothing was excited; name its column.")
     pieces = [piece for r in records for piece in sines_in(r.t, r[command])] if kind in ("", "sines") else []
     covered = sum(b - a for a, b, _ in pieces) / sum(len(r) for r in records)
     if kind == "sines" or (not kind and covered > 0.5):

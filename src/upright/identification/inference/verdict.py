@@ -255,7 +255,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
         )
     elif estimated and not sure and not evidence.unseen:
         no = True
-        reasons.append("No number asked is determined well, so others would explain the runs as well.")
+        reasons.append("No estimated number is determined well, so others would explain the runs as well.")
     for n, e in estimated.items():
         low, high = e.given or e.interval
         limit = evidence.rig.bounds(n) if n in evidence.rig.parameters else (-math.inf, math.inf)
@@ -317,7 +317,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
     elif guessed:
         answer, headline = "in part", f"As numbers of a plant that was guessed.{_and(ratios)}"
     elif evidence.bent and not free:
-        answer, headline = "no", "None of them before the drive's delay is asked for."
+        answer, headline = "no", "None of them before the drive's delay is estimated."
     elif reasons:
         answer, headline = "in part", f"These numbers can be used: {known}{_and(ratios)}"
         if not free:
@@ -326,7 +326,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
             if not missing:
                 headline = "None alone, only their sums."
     else:
-        answer, headline = "yes", f"All numbers can be used: {known}" if sure else "Nothing was asked."
+        answer, headline = "yes", f"All numbers can be used: {known}" if sure else "Nothing was estimated."
     advice = ""
     if any(e.status in ("poorly determined", "unseen") for e in estimated.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."

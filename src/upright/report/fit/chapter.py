@@ -308,7 +308,7 @@ def fit_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cross
     """
     if fit.failed:
         yield Step(
-            "Nothing else can be said before the simulated motion stays finite: check the plant and the signs and "
+            "Nothing else is known before the simulated motion stays finite: check the plant and the signs and "
             "units of drive and sensors, and fit from measured states, a short time ahead.",
             '[[runs]]\nhorizon = "0.5 s"',
         )

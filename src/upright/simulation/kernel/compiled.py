@@ -37,6 +37,7 @@ RUN: tuple[Type, ...] = (
 )  # fmt: skip
 """Types of `lanes.RUN_ARGUMENTS`."""
 
+_ARRAYS = [isinstance(t, ArrayOf) for t in RUN]
 _WORDS = struct.Struct("=" + "".join("d" if t == FLOAT else "q" for t in RUN))
 
 EVENTS: tuple[Type, ...] = (ArrayOf(0), ArrayOf(0), INT, FLOAT)
@@ -132,7 +133,7 @@ def _steps(address: int) -> Callable[..., None]:
     function = machine.function(address)
 
     def run(*args: Any) -> None:
-        function(_WORDS.pack(*[id(a) if isinstance(t, ArrayOf) else a for t, a in zip(RUN, args, strict=True)]))
+        function(_WORDS.pack(*[id(a) if by_address else a for by_address, a in zip(_ARRAYS, args, strict=True)]))
 
     return run
 

@@ -136,10 +136,10 @@ class Expressions:
         n = len(a.items)
         if i.const is not None:
             if not -n <= i.const < n:
-                raise Unsupported(f"number {i.const} is asked of a tuple of {n}")
+                raise Unsupported(f"number {i.const} is read from a tuple of {n}")
             return a.items[i.const]
         if i.type.kind == "float" or not n:
-            raise Unsupported("an item of a tuple is asked for by something that is no whole number")
+            raise Unsupported("an item of a tuple is read at an index that is no whole number")
         out = a.items[0]
         for k, x in enumerate(a.items[1:], 1):
             here = [self.write.compare("==", i, whole(place)) for place in (k, k - n)]

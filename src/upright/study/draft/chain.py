@@ -84,7 +84,7 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[
     if start.grounded:
         doubts.append(
             f"Under a constant command the last body rests at {start.grounded:.2f} of its neighbour's place: a spring"
-            " to ground was asked for it."
+            " to ground is estimated for it."
         )
     tables = [
         _rig(record, log, plant, start),
@@ -188,7 +188,7 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
     unit, scale = _volts(c)
     damping = per(force.unit, f"{_unit(plant, force.on)}/s")
     actuator = TomlTable("[actuator]")
-    why = f"{force.meaning} per command: nobody measured it, so masses, springs and friction are per that"
+    why = f"{force.meaning} per command: not measured, so masses, springs and friction are per that"
     actuator.key("gain", assumed(1, per(force.unit, unit)), why)
     braked = {"guess": with_unit(start.braked, damping), "min": 0}
     actuator.key("damping", braked, "of the drive while commanded", off=not start.braked)
@@ -204,7 +204,7 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
 def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     coordinate = next(k for k in plant.coordinates if k.name == name)
     counts, whose = log.counts[coordinate.unit]
-    sentence = f"{whose}; what is said in V, s and counts does not depend on it"
+    sentence = f"{whose}; what is in V, s and counts does not depend on it"
     driven = log.recognised.drive is not None
     return sensor_table(
         coordinate, log.recognised.columns[name], log.recognised.rest[name], (counts, sentence), driven=driven

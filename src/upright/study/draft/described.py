@@ -47,7 +47,7 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
     rig = named["[rig]"]
     if is_ecp(inspection):
         vendor = "ECP 210" if coordinates[body] == "m" else "ECP 205"
-        rig.key("vendor", vendor, "the log is an ECP rig's; its data sheet says what is not said here")
+        rig.key("vendor", vendor, "the log is an ECP rig's; its data sheet has what is missing here")
     else:
         period = f"{record.period * 1e3:.4g} ms"
         rig.key("servo_period", {"value": period, "assumed": True}, "the log's; MEASURE if the controller is faster")

@@ -57,7 +57,7 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
     describe(tables, record, inspection, recognised)
     if not plant:
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
-        rig.key("guessed", True, "nobody named the plant: take this out once you know it is this one")
+        rig.key("guessed", True, "the plant was not specified: take this out once you know it is this one")
     doubts = [*recognised.doubts, *([] if plant else alike(record, inspection, recognised))]
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")

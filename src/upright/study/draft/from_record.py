@@ -145,7 +145,7 @@ def _answer(
         if name not in names:
             raise BadInput(f"{plant.__name__} has no number '{name}'; {nearest(name, names)}")
         if name in known and name in estimated:
-            raise BadInput(f"'{name}' cannot be known and asked at once; leave it out of one.")
+            raise BadInput(f"'{name}' cannot be known and estimated at once; leave it out of one.")
 
     def table(name: str) -> tuple[dict[str, Any], str]:
         return (actuator, name.partition(".")[2]) if name in ACTUATOR else (values, name)
@@ -167,7 +167,7 @@ def _answer(
     missing = [n for n in plant.names() if n not in values and n not in defaults]
     if missing:
         raise BadInput(
-            f"{plant.__name__} needs {', '.join(missing)}, neither known nor asked; measure and pass"
+            f"{plant.__name__} needs {', '.join(missing)}, neither known nor estimated; measure and pass"
             f' known={{"{missing[0]}": ...}}, or ask for it with a guess.'
         )
 
@@ -198,7 +198,9 @@ def _guess(values: Mapping[str, Any], plant: type[Plant], name: str) -> Number:
     other = name.replace("_1", "_2", 1)
     if name.startswith("b_1") and other in names and number(other) > 0:
         return number(other)
-    raise BadInput(f'{name} is asked and no guess of it can be read from the log; pass ask={{"{name}": "..."}}.')
+    raise BadInput(
+        f'{name} is to be estimated and no guess of it can be read from the log; pass ask={{"{name}": "..."}}.'
+    )
 
 
 def _lines(study: Mapping[str, Any]) -> Iterator[str]:

@@ -68,7 +68,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
     if isinstance(made.law, Rule) and (single or not target.rules):
         of_rules = (t.name for t in TARGETS.own.values() if isinstance(t, LawTarget) and t.rules)
         raise BadInput(
-            f"a rule goes --to {', '.join(of_rules)} in double precision, since nobody knows what it makes of a "
+            f"a rule goes --to {', '.join(of_rules)} in double precision, since it is not known what it makes of a "
             f"rounding; got {'--float' if single else target.name}."
         )
     test = self_test(made)
@@ -77,7 +77,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
     unit, step = made.command_unit, float(made.converter.max(initial=0.0))
     warnings: list[str] = []
     if not math.isfinite(made.law.limit):
-        warnings.append("Nobody said how large a command may be, so the program limits none: design with --limit.")
+        warnings.append("The command's limit is not specified, so the program has none: design with --limit.")
     exact = f"{len(test.readings)} samples are replayed and compared bit for bit"
     miss = f"{number(test.single, 2)} {unit}".strip()
     if single:

@@ -114,7 +114,9 @@ def ladder(
         for name in ("ladder.json", "study.toml", "ladder.html"):
             check_output(at / name)
     if not requested.model.estimated:
-        raise BadInput(f'{study}: nothing is asked; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}')
+        raise BadInput(
+            f'{study}: nothing to estimate; give a parameter a guess, such as b_2c = {{ guess = "1e-4 N m" }}'
+        )
     climbed = climb(requested.model, requested.runs, requested.ladder or None, progress=progress, workers=shared)
     if not climbed.steps:
         raise KeyboardInterrupt

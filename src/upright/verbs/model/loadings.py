@@ -153,20 +153,20 @@ def plan_inertias(
     from upright.experiments.weighing_1a.plan import chapter, choices, fewest_runs
     from upright.identification.loadings import plan_loadings
     from upright.report.drawing import picture_format
-    from upright.rig.makes import OSCILLATORS
+    from upright.rig.makes import BODIES
     from upright.verbs.values import si_if_given
 
     if out is not None:
         picture_format(Path(out))  # before the work begins
-    if rig not in OSCILLATORS:
-        raise BadInput(f"--rig is {' or '.join(OSCILLATORS)}, got '{rig}'; {nearest(rig, OSCILLATORS)}")
+    if rig not in BODIES:
+        raise BadInput(f"--rig is {' or '.join(BODIES)}, got '{rig}'; {nearest(rig, BODIES)}")
     for value, option, most in ((runs, "--runs", 16), (levels, "--levels", 5)):
         if not 2 <= value <= most:
             raise BadInput(f"{option} needs a whole number from 2 to {most}, got {value}.")
-    body = OSCILLATORS[rig]
+    body = BODIES[rig]
     choice = choices(rig, [si(r, "m") for r in paths(radius) if r != ""])
     bare_inertia = si_if_given(bare, body.unit)
-    m_0 = body.plant.parameters()[body.inertia] if bare_inertia is None else bare_inertia
+    m_0 = body.rig.plant.parameters()[body.inertia] if bare_inertia is None else bare_inertia
     piece = min(w.added for w in choice if w.added > 0)
     piece = piece / 2 if rig == "torsional" else piece
     e, g = _share(error, "--error"), _share(tolerance, "--tolerance")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 
     upright predict swing-fit/fit.json other_day.toml
 
-    Exit code: 0 predicted as well as the fit promises, 3 worse, 2 the model, the
-    study or a log is wrong.
+    upright predict swing-fit/fit.json other_day.csv
+
+    Exit code: 0 predicted as well as the fit promises, 3 worse, or only runs that
+    the fit has seen, 2 the model, the study or a log is wrong.
     """,
 )
 @keeps_its_inputs
@@ -96,17 +99,20 @@ def predict(
     runs = [replace(run, role="predict") for run in requested.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
     kept = promise(scores, fitted.bands, fitted.scores)
+    seen = {run.label: label for run in runs if (label := fitted.fitted_run(run.source))}
+    verdict = f"{_seen(seen, len(runs))}{kept.sentence}"
     names = ("beyond", "role", "fit_percent", "horizon", "adapted", "offer", "inside")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,
-        "verdict": kept.sentence,
+        "verdict": verdict,
         "as_promised": kept.holds,
+        "seen_in_the_fit": seen,
         "runs": {label: {name: getattr(s, name) for name in names} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     page = Chapter(
-        title=f"{of} on {on}", verdict=kept.sentence, sound=kept.holds, numbers=numbers,
+        title=f"{of} on {on}", verdict=verdict, sound=kept.holds and len(seen) < len(runs), numbers=numbers,
         parts=(
             Part(
                 "How much of each signal is explained",
@@ -124,6 +130,15 @@ def predict(
     return Answer(
         scores, page, [write_json(at / "prediction.json", numbers), *write_page(page, at / "prediction.html", pdf)]
     )
+
+
+def _seen(seen: Mapping[str, str], runs: int) -> str:
+    """What has to stand before the verdict where runs were fitted: how they are explained is no prediction."""
+    if not seen:
+        return ""
+    which = ", ".join(f"'{run}' (as '{label}')" if run != label else f"'{run}'" for run, label in seen.items())
+    what = "This is no prediction: the fit has seen" if len(seen) == runs else "The fit has seen"
+    return f"{what} {which}. "
 
 
 def _runs_to_predict(fitted: StoredFit, source: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:

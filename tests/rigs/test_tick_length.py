@@ -1,0 +1,37 @@
+"""Is a board whose tick is longer than it says found by the host's clock, and a sound one left alone?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.rigs.test_supervisor import RIG, Scene
+from upright.errors import RigStopped
+from upright.rigs.tick_length import JITTER, LEAST, OFF, TickLength
+
+T = RIG.period
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.9, 1.1, 2.0])
+def test_a_tick_of_another_length_is_measured_within_a_second(factor):
+    ticking = TickLength()
+    found = [ticking.sees(k * T, k * T * factor) for k in range(round(1.1 / T))]
+    seen = next(k for k, longer in enumerate(found) if longer != 1.0)
+    assert found[seen] == pytest.approx(factor)
+    assert min(seen * T, seen * T * factor) >= 0.0
+    assert max(seen * T, seen * T * factor) >= LEAST
+
+
+def test_late_samples_and_a_clock_within_its_tolerance_are_no_slow_tick():
+    """Every sample late by up to what is allowed, and a resonator off by half of what is allowed, for a minute."""
+    rng, ticking = np.random.default_rng(5), TickLength()
+    late = rng.uniform(0, JITTER, 60_000)
+    assert all(ticking.sees(k * 1e-3, k * 1e-3 * (1 + OFF / 2) + x) == 1.0 for k, x in enumerate(late))
+
+
+def test_a_run_on_a_board_with_a_slow_tick_is_stopped_with_its_length():
+    scene = Scene().started()
+    scene.beside.clock = lambda: 2.0 * scene.rig.sample.time
+    with pytest.raises(RigStopped, match=r"its tick lasts 2 times 0\.884 ms by this computer's clock"):
+        scene.run(1.0)
+    assert scene.told[-1] == ("fault", 0.0, False)
