@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         "reference": 'That the law follows: "square 0.3 8".',
         "duration": "How long.",
     },
-    wrong=lambda done: not done.value.sound,  # whether it ran, whatever its model is worth
+    wrong=lambda answer: not answer.value.sound,  # whether it ran, whatever its model is worth
     more="""
     Space, q, Esc or Ctrl-C stop it: zero first.
     This is software, not a rated safety function: keep a stop in hardware within reach.
@@ -116,7 +116,7 @@ def run(
     name="rig check",
     metavars={"rate": "HZ"},
     defaults={"out": "rig-check"},
-    wrong=lambda done: not done.chapter.sound,
+    wrong=lambda answer: not answer.chapter.sound,
     more="""
     Measure with everything running that will run beside the loop.
 
@@ -178,7 +178,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     metavars={"rig": "RIG.toml"},
     helps={"rig": "What the rig is, and how far it may go."},
     prepare=_for_hardware,
-    wrong=lambda done: not done.chapter.sound,
+    wrong=lambda answer: not answer.chapter.sound,
     more="""
     Let the rig hang freely, with nobody in its way: the pulse moves it.
 
