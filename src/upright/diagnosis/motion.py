@@ -64,7 +64,7 @@ def motion_of(case: Case) -> SmoothedMotion | str:
     coordinates = [c.name for c in case.plant.coordinates]
     missing = [c for c in coordinates if c not in case.places and c not in case.locked]
     if case.chained and case.rig is None and case.places:
-        missing = []  # a body without a column was held, or is at least not told of
+        missing = []  # a body without a column was held, or is at least not mentioned
     if missing:
         return f"no column measures {', '.join(missing)}"
     steps = np.diff(case.record.t)
@@ -180,12 +180,12 @@ class Row:
         return float(rest @ rest) / (float(self.target @ self.target) or 1.0)
 
 
-def chosen(left: Sequence[float]) -> int:
+def simplest(left: Sequence[float]) -> int:
     """Which of a plain and a whole form to take that leave these shares."""
     return len(left) - 1 if left[0] > PLAIN and left[-1] < FEWER * left[0] else 0
 
 
-def terms(motion: SmoothedMotion) -> list[Term]:
+def sign_terms(motion: SmoothedMotion) -> list[Term]:
     """Terms with a known sign."""
     return [term for i in motion.rows for term in _row_terms(motion, i)]
 
@@ -204,7 +204,7 @@ def driven_row(motion: SmoothedMotion, here: NDArray[np.bool_]) -> list[tuple[Ar
 def _row(motion: SmoothedMotion, i: int) -> Row | None:
     """Equation of one body, in its plain form unless the whole one explains far more; where the body slides."""
     forms = [row.at(motion.slides(i)) for row in _forms(motion, i)]
-    return forms[chosen([form.left for form in forms])] if forms else None
+    return forms[simplest([form.left for form in forms])] if forms else None
 
 
 def _forms(motion: SmoothedMotion, i: int) -> list[Row]:

@@ -69,15 +69,15 @@ class _Disk(threading.Thread):
 
     def __init__(self, output: _Output) -> None:
         super().__init__(daemon=True)
-        self._output, self._asked = output, threading.Event()
+        self._output, self._requested = output, threading.Event()
         self.start()
 
     def ask(self) -> None:
-        self._asked.set()
+        self._requested.set()
 
     def run(self) -> None:
-        while self._asked.wait():
-            self._asked.clear()
+        while self._requested.wait():
+            self._requested.clear()
             self._output.sync()
 
 
@@ -197,7 +197,7 @@ def _ordinary_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # type: ignore[attr-defined]
 
 
-def main(path: str, memory: str, rows: int) -> None:
+def write_log(path: str, memory: str, rows: int) -> None:
     """Write one log, its header the first line of this process's input, from a ring that another process made."""
     _ordinary_priority()
     about = LogHeader.of_metadata(json.loads(sys.stdin.buffer.readline()))
@@ -225,4 +225,4 @@ def main(path: str, memory: str, rows: int) -> None:
 
 if __name__ == "__main__":
     _path, _memory, _rows = sys.argv[1:]
-    main(_path, _memory, int(_rows))
+    write_log(_path, _memory, int(_rows))

@@ -13,7 +13,7 @@ _ROW, _TOP, _GAP = 24, 70, 16
 _BOARD, _DEVICE = (24, 190), (420, 470)
 """Left edge and width of the board, and of what it is wired to."""
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
-"""Okabe and Ito's, told apart by the colour-blind too."""
+"""Okabe and Ito's, distinguishable by the colour-blind too."""
 
 
 def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
