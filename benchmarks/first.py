@@ -341,11 +341,12 @@ def _told(contacts: Sequence[Contact]) -> str:
 
 def agreeing(contacts: Sequence[Contact]) -> tuple[int, int]:
     """Logs whose dialects came to the same plant, the same end and the same numbers (a tenth of the interval), of how
-    many."""
+    many that were met in several."""
     logs: dict[str, list[Contact]] = {}
     for c in contacts:
         logs.setdefault(c.log, []).append(c)
-    return sum(_same(each) for each in logs.values()), len(logs)
+    several = [each for each in logs.values() if len(each) > 1]
+    return sum(_same(each) for each in several), len(several)
 
 
 def _same(each: Sequence[Contact]) -> bool:
