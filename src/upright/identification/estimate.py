@@ -345,10 +345,10 @@ def _scores(
     scores = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
-    foreseen = [r for r in runs if r.role != "fit"]
+    others = [r for r in runs if r.role != "fit"]
     pace = min(t.period for t in problem.tracks)
-    for label, predicted in predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress).items():
-        held_out = next(run for run in foreseen if run.label == label)
+    for label, predicted in predict(values, rig, others, groups=known, bands=bands, progress=log.progress).items():
+        held_out = next(run for run in others if run.label == label)
         scores[label] = replace(predicted, black_box=black_box(fitted, held_out, pace))
     return {run.label: scores[run.label] for run in runs}
 

@@ -68,12 +68,12 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
 
 def _dac(actuator: Section, unit: str) -> dict[str, Entry]:
     """Step of a converter that its bits and its range, from -range to range, give."""
-    said = [key for key in ("bits", "range") if key in actuator]
-    if not said:
+    present = [key for key in ("bits", "range") if key in actuator]
+    if not present:
         return {}
-    if len(said) < 2 or "converter" in actuator:
+    if len(present) < 2 or "converter" in actuator:
         raise actuator.error(
-            said[0], "a converter has bits and range, as in bits = 12, range = \"10 V\" of one from -10 to 10 V, or "
+            present[0], "a converter has bits and range, as in bits = 12, range = \"10 V\" of one from -10 to 10 V, or "
             "its step alone, converter = \"4.88 mV\""
         )  # fmt: skip
     value, source = actuator.stated("range", unit)

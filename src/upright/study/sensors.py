@@ -21,7 +21,7 @@ from upright.study.text import Section, as_written, in_si
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
 _ON_GRID = 1e-6  # and by less than this as at the grid's instant
 _MOST = 10_000_000  # samples of a run, some 80 MB for each of its signals
-_GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
+_GAP, _HOPELESS = 5, 100  # periods without a sample: reported, refused
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -121,13 +121,13 @@ def firmware_flash(
 
     made = board_of(board)
     image = build(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
-    done = flash(made, image.path, port, hand=hand)
+    flashed = flash(made, image.path, port, hand=hand)
     return Answer(
-        done,
+        flashed,
         Chapter(
-            title=f"Firmware on the {made.title}", verdict=f"{done.greeting} answers.",
+            title=f"Firmware on the {made.title}", verdict=f"{flashed.greeting} answers.",
             detail="It was read back as it was written. It stands in FAULT until a host clears it.",
-            numbers={"port": done.port, "image": str(done.image), "greeting": done.greeting},
+            numbers={"port": flashed.port, "image": str(flashed.image), "greeting": flashed.greeting},
         ),
         [image.path],
     )  # fmt: skip

@@ -164,9 +164,10 @@ def _sentence(result: Regulation, a: Attempt) -> str:
         f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}; rms at rest "
         f"{of_limit(b.rest_rms)}."
     )
-    if a.after is None or a.came is None:
+    if a.after is None or a.measured is None:
         return f"{predicted} It was not run." if result.ran else predicted
-    return f"{predicted} {_came(result.rig, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
+    measured = _measured_sentence(result.rig, a.measured.score, effort_at_rest(a.after))
+    return f"{predicted} {measured} {a.measured.ended}".rstrip()
 
 
 def _probability(a: Attempt, share: float) -> str:
@@ -180,7 +181,7 @@ def _shares(a: Attempt) -> str:
     return ", ".join(f"{w} {in_percent(a.before.words[w])}" for w in WORDS if a.before.words[w] > 0)
 
 
-def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
+def _measured_sentence(rig: Rig, s: Score, rest: RestEffort) -> str:
     driven = plain(rig.plant.inputs[0].on)
     if not s.held and s.fell < s.ran_out:
         return f"Measured: it fell after {s.fell:.2g} s."
@@ -392,7 +393,7 @@ def _numbers(result: Regulation) -> dict[str, Any]:
 
 def _set(a: Attempt) -> dict[str, Any]:
     b = a.before
-    came = a.came
+    measured = a.measured
     return {
         "poles": a.placement.requested,
         "K": a.placement.K[0],
@@ -403,8 +404,9 @@ def _set(a: Attempt) -> dict[str, Any]:
             "margins": b.margins, "rest": _rest(b.rest),
             **_scored(b.score),
         },
-        "after": None if came is None else {
-            "word": a.word, "ended": came.ended, "rest": _rest(effort_at_rest(came.trial)), **_scored(came.score),
+        "after": None if measured is None else {
+            "word": a.word, "ended": measured.ended, "rest": _rest(effort_at_rest(measured.trial)),
+            **_scored(measured.score),
         },
     }  # fmt: skip
 

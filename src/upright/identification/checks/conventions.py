@@ -17,7 +17,7 @@ CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
 
 COARSE = 1e-3
-"""Relative step of what is left at which a convention's numbers are good enough to be told from another's."""
+"""Relative step of what is left at which a convention's numbers are good enough to be distinguished from another's."""
 
 CLOSER = 0.98
 """Of two that explain nearly the same the one tried first stays; a mirror image of a free rig explains the same."""

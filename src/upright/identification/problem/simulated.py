@@ -199,7 +199,7 @@ def restart_states(
     place = np.full(last + 1, -1)
     place[track.restarts] = np.arange(track.restarts.size)
     out = np.full((len(x), track.restarts.size, lanes), np.nan)
-    with np.errstate(over="ignore", invalid="ignore"):  # a lane that runs away is told by its NaN
+    with np.errstate(over="ignore", invalid="ignore"):  # a lane that diverges shows by its NaN
         for j in range(1, steps):
             stepping.params[drift] = still + x[states:].reshape(len(still), -1)
             stepping.state[:] = x[:states].reshape(states, -1)

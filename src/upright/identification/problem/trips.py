@@ -30,14 +30,14 @@ class Moments:
 
     def __init__(self, rig: GreyBox) -> None:
         self.rig = rig
-        self._seen: dict[tuple[int, int], tuple[Run, tuple[list[Trip], bool]]] = {}
+        self._observed: dict[tuple[int, int], tuple[Run, tuple[list[Trip], bool]]] = {}
 
     def of(self, run: Run) -> tuple[list[Trip], bool]:
         """Trips of a run, and whether the command plainly acts until its logged end."""
         key = id(run.y), id(run.u)  # of a run that is kept here, so that no other takes its place
-        if key not in self._seen:
-            self._seen[key] = run, _moments(self.rig, run)
-        return self._seen[key][1]
+        if key not in self._observed:
+            self._observed[key] = run, _moments(self.rig, run)
+        return self._observed[key][1]
 
 
 def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:

@@ -30,6 +30,8 @@ class BoardKind:
         Of an image: ``"hex"`` or ``"uf2"``.
     tools : mapping of str to str
         What builds an image, and Debian's package of each.
+    logic : str
+        Its supply for encoders, as its pins stand it.
     flasher : str
         Program that writes an image; empty where it is copied to the board's own drive.
     usb : tuple of tuple of int
@@ -41,6 +43,7 @@ class BoardKind:
     drives: tuple[str, ...]
     suffix: str
     tools: Mapping[str, str]
+    logic: str = "5 V"
     flasher: str = ""
     usb: tuple[int, ...] = ()
 
@@ -71,7 +74,7 @@ BOARDS: Mapping[str, BoardKind] = {
         BoardKind(
             name="pico", title="Raspberry Pi Pico", drives=(PAIR, SIGN), suffix="uf2",
             tools={"make": "make", "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi"},
-            usb=(0x0403, 0x10C4, 0x1A86),
+            logic="3V3", usb=(0x0403, 0x10C4, 0x1A86),
         ),
     )
 }  # fmt: skip

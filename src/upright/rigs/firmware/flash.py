@@ -138,18 +138,18 @@ def _copied(
     board: BoardKind, image: Path, port: str, hand: Callable[[str], bool], greet: Callable[[str], str]
 ) -> Flashed:
     """An image onto the drive that a board shows while its button is held; the boot ROM checks each block."""
-    found = drives()
-    if len(found) != 1:
+    volumes = drives()
+    if len(volumes) != 1:
         raise BadInput(
             f"a {board.title} takes its image as a drive: hold BOOTSEL while you plug it in, and say it again; "
-            f"{len(found) or 'no'} such drives are there. Or copy {image} onto it yourself."
+            f"{len(volumes) or 'no'} such drives are there. Or copy {image} onto it yourself."
         )
     if not hand(
-        f"The {board.title} at {found[0]} gets {image.name}; what is on it is lost. Its motor's supply is off."
+        f"The {board.title} at {volumes[0]} gets {image.name}; what is on it is lost. Its motor's supply is off."
     ):
         raise RigStopped("Nothing was written.")
-    shutil.copyfile(image, found[0] / image.name)
-    return Flashed(port=port or str(found[0]), image=image, greeting=greet(port) if port else image.stem)
+    shutil.copyfile(image, volumes[0] / image.name)
+    return Flashed(port=port or str(volumes[0]), image=image, greeting=greet(port) if port else image.stem)
 
 
 def _last(text: str) -> str:

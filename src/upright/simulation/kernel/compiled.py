@@ -18,7 +18,7 @@ from upright.simulation.kernel.equations import acceleration, step, terms
 from upright.simulation.kernel.events import events, places
 from upright.simulation.kernel.flavour import Layout
 from upright.simulation.kernel.lanes import ROUNDING, RUN_ARGUMENTS, law_text, run_text
-from upright.simulation.lowering import cache as kept
+from upright.simulation.lowering import cache as stored_code
 from upright.simulation.lowering.gpu import threads
 from upright.simulation.lowering.module import Module, Platform
 from upright.simulation.lowering.operands import FLOAT, INT, ArrayOf, Type, Unsupported
@@ -63,7 +63,7 @@ def source(p: Layout) -> str:
 @cache
 def _version() -> str:
     """What the machine code depends on besides the text."""
-    return f"{kept.lowered_by()} {hashlib.sha256(Path(__file__).read_bytes()).hexdigest()}"
+    return f"{stored_code.lowered_by()} {hashlib.sha256(Path(__file__).read_bytes()).hexdigest()}"
 
 
 class Kernel:
@@ -123,7 +123,7 @@ class Kernel:
             self.compiled.append(name)
             return compiled()
 
-        return kept.code(kept.key(_version(), name, "strict" * self._strict, self.text), noted)
+        return stored_code.code(stored_code.key(_version(), name, "strict" * self._strict, self.text), noted)
 
 
 def _steps(address: int) -> Callable[..., None]:

@@ -98,21 +98,21 @@ def predict(
     rig = replace(requested.model, substeps=fitted.substeps)
     runs = [replace(run, role="predict") for run in requested.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
-    kept = promise(scores, fitted.bands, fitted.scores)
-    seen = {run.label: label for run in runs if (label := fitted.fitted_run(run.source))}
-    verdict = f"{_seen(seen, len(runs))}{kept.sentence}"
+    promised = promise(scores, fitted.bands, fitted.scores)
+    fitted_runs = {run.label: label for run in runs if (label := fitted.fitted_run(run.source))}
+    verdict = f"{_fitted_note(fitted_runs, len(runs))}{promised.sentence}"
     names = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,
         "verdict": verdict,
-        "as_promised": kept.holds,
-        "seen_in_the_fit": seen,
+        "as_promised": promised.holds,
+        "seen_in_the_fit": fitted_runs,
         "runs": {label: {name: getattr(s, name) for name in names} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     page = Chapter(
-        title=f"{of} on {on}", verdict=verdict, sound=kept.holds and len(seen) < len(runs), numbers=numbers,
+        title=f"{of} on {on}", verdict=verdict, sound=promised.holds and len(fitted_runs) < len(runs), numbers=numbers,
         parts=(
             Part(
                 "How much of each signal is explained",
@@ -132,12 +132,12 @@ def predict(
     )
 
 
-def _seen(seen: Mapping[str, str], runs: int) -> str:
+def _fitted_note(fitted_runs: Mapping[str, str], runs: int) -> str:
     """What has to stand before the verdict where runs were fitted: how they are explained is no prediction."""
-    if not seen:
+    if not fitted_runs:
         return ""
-    which = ", ".join(f"'{run}' (as '{label}')" if run != label else f"'{run}'" for run, label in seen.items())
-    what = "This is no prediction: the fit has seen" if len(seen) == runs else "The fit has seen"
+    which = ", ".join(f"'{run}' (as '{label}')" if run != label else f"'{run}'" for run, label in fitted_runs.items())
+    what = "This is no prediction: the fit has seen" if len(fitted_runs) == runs else "The fit has seen"
     return f"{what} {which}. "
 
 
