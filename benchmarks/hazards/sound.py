@@ -125,7 +125,10 @@ class Played:
             if math.isfinite(lane.stopped) or math.isfinite(lane.fell):
                 continue
             drive, pendulum = stills[i]
-            if drive.sees(away[i][0], away[i], commands[i]) or pendulum.sees(away[i]):
+            if drive.sees(away[i][0], away[i], commands[i]):
+                what = "the drive, which moves nothing" if watch.weak(i) else "an encoder that shows not a single count"
+                lane.stopped, lane.why = t, what
+            elif pendulum.sees(away[i]):
                 lane.stopped, lane.why = t, "an encoder that shows not a single count"
             elif says[i]:
                 lane.stopped, lane.why = t, str(watch.suspicions[int(best[i])])
