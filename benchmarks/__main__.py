@@ -121,7 +121,14 @@ def main(arguments: list[str] | None = None) -> int:
         help="only changes of a room, a file or a line: identification/ladder, gains/lqr.py:141",
     )
     changes.add_argument(
-        "--slow", action="store_true", help="what no quick test notices is put to the slow tests that cover it, 120 s"
+        "--slow", action="store_true", help="what no quick test notices is put to the slow tests that cover it"
+    )
+    changes.add_argument(
+        "--seconds",
+        type=float,
+        default=60.0,
+        metavar="N",
+        help="CPU time of the quick tests for one change [s], default 60; the slow ones have twice as much",
     )
     changes.add_argument(
         "--map",
@@ -155,6 +162,7 @@ def main(arguments: list[str] | None = None) -> int:
         "mutants": {
             "sample": asked.sample, "seed": asked.seed, "within": asked.within, "folder": asked.map,
             "verdicts": asked.judged, "workers": asked.workers or 2, "slow": asked.slow,
+            "seconds": asked.seconds,
         },
     }  # fmt: skip
     for name in asked.names or [name for name in NAMES if name not in APART]:

@@ -2,9 +2,10 @@
 
 Operators, comparisons, constants, guards, indices and signs: each change is one place, drawn from all of them, and the
 quick tests that cover it run until one fails, the nearest and cheapest first, 60 s of CPU of them. `--slow` then runs
-the slow tests that cover what no quick one noticed, 120 s of them. A test that hangs has noticed. Intervals are
-Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no difference is left out of
-the shares when a file names it: its lines are `file:line before -> after  # reason`, as they are listed.
+the slow tests that cover what no quick one noticed, 120 s of them; `--seconds` allows less. A test that hangs has
+noticed. Intervals are Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no
+difference is left out of the shares when a file names it: its lines are `file:line before -> after  # reason`, as they
+are listed.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pathlib import Path
 from benchmarks.measure import Line, Target, page
 from benchmarks.mutants.covering import SOURCE, digest, map_of
 from benchmarks.mutants.places import Change, compiles, places
-from benchmarks.mutants.trial import SECONDS, SLOW_SECONDS, Bench, Outcome
+from benchmarks.mutants.trial import LONGER, SECONDS, Bench, Outcome
 from benchmarks.mutants.trying import Kept, said, tried
 
 ROOT = Path(__file__).parents[2]
@@ -75,7 +76,7 @@ def judged(file: Path | None) -> set[str]:
 def run(
     *, quick: bool, progress: Callable[[str], None], sample: int = 150, seed: int = 0, within: str = "",
     folder: Path | None = None, verdicts: Path | None = None, workers: int = 2, slow: bool = False,
-    markdown: Path | None = None,
+    seconds: float = SECONDS, markdown: Path | None = None,
 ) -> list[Line]:  # fmt: skip
     """A line for each room, one or two for all, and one for each change that went unnoticed."""
     cache = Path(os.environ["UPRIGHT_CACHE"]) if os.environ.get("UPRIGHT_CACHE") else None
@@ -88,13 +89,14 @@ def run(
     with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:
         benches = [Bench(ROOT, Path(name) / str(i), cache) for i in range(workers)]
         before = [Kept(kept / f"{suite}-{digest(ROOT)}.jsonl") for suite in ("quick", "slow")]
-        done = tried(benches, changes, covered, SECONDS, before[0], progress)
+        done = tried(benches, changes, covered, seconds, before[0], progress)
         if slower is not None:
             left = [o.change for o in done if not o.noticed and _line(o) not in harmless]
-            by_slow = tried(benches, left, slower, SLOW_SECONDS, before[1], progress)
+            by_slow = tried(benches, left, slower, LONGER * seconds, before[1], progress)
     lines = table(done, harmless, by_slow)
     if markdown is not None:
-        asked = f"Sample {len(changes)}, seed {seed}{f', within {within}' * bool(within)}; {len(done)} were tried."
+        where = f", within {within}" if within else ""
+        asked = f"Sample {len(changes)}, seed {seed}{where}; {len(done)} were tried, with {seconds:g} s of quick tests."
         text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines))
         markdown.write_text(text, encoding="utf-8")
     return lines

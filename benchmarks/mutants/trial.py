@@ -17,8 +17,8 @@ from benchmarks.mutants import watch
 from benchmarks.mutants.covering import Covering
 from benchmarks.mutants.places import Change
 
-SECONDS, SLOW_SECONDS, SLOWER = 60.0, 120.0, 2.0
-"""Seconds of CPU of the quick tests for one change, of the slow ones, and how much longer they may take in all."""
+SECONDS, LONGER, SLOWER = 60.0, 2.0, 2.0
+"""Seconds of CPU of the quick tests for one change; how many times as long the slow ones have, and both in all."""
 PATIENCE = 1800.0
 """Seconds by the clock on the wall after which a run that no longer says anything hangs."""
 MOST = 400
@@ -98,8 +98,12 @@ class Bench:
             ran += len(begun)
             if not by:
                 break
-            noticed = not begun or self._passes(begun[-1], covering)
-            tests = tests[tests.index(begun[-1]) + 1 :] if begun else []
+            if not begun:
+                whole = [test for test in tests if self._imported(test.partition("::")[0])]
+                noticed, tests = len(whole) == len(tests), whole
+                continue
+            noticed = self._passes(begun[-1], covering)
+            tests = tests[tests.index(begun[-1]) + 1 :]
         shown = change.shown(source)
         return Outcome(
             change=change, shown=shown, noticed=noticed, by=by if noticed else "", ran=ran, covering=direct
@@ -125,9 +129,21 @@ class Bench:
         """Whether a test passes alone and without a change; asked once."""
         if test not in self.alone:
             kept = self.report.read_bytes()
-            self.alone[test] = not self._run([test], covering, SLOW_SECONDS)
+            self.alone[test] = not self._run([test], covering, LONGER * SECONDS)
             self.report.write_bytes(kept)
         return self.alone[test]
+
+    def _imported(self, file: str) -> bool:
+        """Whether a file of tests can be imported without a change; asked once."""
+        if file not in self.alone:
+            command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-m", "", "-p", "no:cacheprovider"]
+            environment = dict(os.environ) | {"PYTHONPATH": str(self.tree / "src"), "UPRIGHT_CACHE": str(self.cache)}
+            found = subprocess.run(
+                [*command, "--collect-only", file], cwd=self.tree, env=environment, check=False,
+                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+            self.alone[file] = found.returncode == 0
+        return self.alone[file]
 
     def _run(self, tests: Sequence[str], covering: Covering, seconds: float) -> str:
         if self.ended:

@@ -2,6 +2,7 @@
 
 import ast
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -128,6 +129,24 @@ def covering_of(root, **tests):
         seconds=dict.fromkeys(names, 0.01), tests=names, files={}, sources={"src/pkg.py": HALF},
         lines={"src/pkg.py": lines},
     )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_file_of_tests_that_cannot_be_imported_in_any_case_notices_nothing(tree, tmp_path):
+    """One that imports what is not there stands beside one that does; a change by which none can is noticed."""
+    (tree / "tests/test_gone.py").write_text("from pkg import gone\n\ndef test_gone():\n    pass\n", encoding="utf-8")
+    half, spare = (Change(path="src/pkg.py", place=p, text=b"*") for p in places(HALF.encode()) if b"*" in p.instead)
+    gone = "tests/test_gone.py::test_gone"
+    quick = covering_of(tree, test_half=2, test_nothing=5)
+    lines = {2: [0, 2], 5: [1, 2]}
+    covering = replace(
+        quick, seconds=quick.seconds | {gone: 0.01}, tests=[*quick.tests, gone], lines={"src/pkg.py": lines}
+    )
+    bench = Bench(tree, tmp_path / "bench", None)
+    assert bench.outcome(half, covering).by == "tests/test_pkg.py::test_half"
+    assert not bench.outcome(spare, covering).noticed
+    broken = Change(path="src/pkg.py", place=half.place, text=b"/ 0\n\n\n1 / 0 *")
+    assert bench.outcome(broken, quick).by == "the tests cannot be imported"
 
 
 @pytest.mark.slow

@@ -179,6 +179,21 @@ def test_a_clock_that_starts_again_is_cut_at_its_reset_and_the_longest_piece_is_
     assert (curve.t[41], curve.y[41]) == pytest.approx((41.0, t[41]))
 
 
+@pytest.mark.parametrize(("equal", "advice"), [(0, "Which row holds?"), (1, "Drop them"), (2, "Drop them")])
+def test_rows_of_one_instant_are_compared_with_the_row_before_them(equal, advice, tmp_path):
+    """Rows 21 and 51 repeat an instant; so many of them repeat their values too."""
+    t, x = 0.01 * np.arange(80), np.arange(80.0) ** 2
+    for i, k in enumerate((20, 50)):
+        t[k] = t[k - 1]
+        x[k] = x[k - 1] if i < equal else x[k]
+    log = tmp_path / "log.csv"
+    log.write_text("t [s],x [m]\n" + "".join(f"{a:.8f},{b:.6f}\n" for a, b in zip(t, x, strict=True)), "utf-8")
+    _, found = read_mended(log)
+    (repeat,) = [f for f in found if f.kind == "doubled"]
+    assert repeat.evidence == pytest.approx({"repeated instants [1]": 2, "equal rows [1]": equal})
+    assert repeat.advice.startswith(advice)
+
+
 def test_steps_are_drawn_in_milliseconds_where_they_end():
     (curve,) = steps_panel(np.array([0.0, 0.01, 0.03])).curves
     assert curve.t.tolist() == [0.01, 0.03]

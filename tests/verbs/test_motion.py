@@ -68,6 +68,15 @@ def test_a_command_is_cut_at_its_limit_and_the_drive_turns_it_into_force():
     assert late[V][-1] == pytest.approx(0.25)  # commanded for half a second, of which half was late
 
 
+def test_a_rig_takes_no_more_than_its_limit_unless_it_is_told_another():
+    rig = up.Rig.known(FREE, gain="0.5 N/V", limit="3 V", period="100 ms", counts=1e6)
+    for options, most in (({}, 3.0), ({"limit": 2.0}, 2.0)):
+        run = up.simulate(rig, u=[5.0, -5.0], seconds=0.2, **options)
+        assert run[FORCE].tolist() == [most, -most, -most]  # a period each, the last is held
+        np.testing.assert_allclose(run[V], [0.0, most * 0.5 * 0.1 / 2.0, 0.0], atol=1e-12)
+        assert run.units[FORCE] == "V"
+
+
 def test_a_start_is_a_deviation_from_the_equilibrium_asked_for():
     run = up.simulate(PENDULUM, at="inverted", start={"theta": "0.5 deg", "theta_dot": 0.25}, seconds=0.01)
     assert run["theta"][0] == pytest.approx(math.pi + math.radians(0.5))
@@ -133,6 +142,7 @@ def test_the_low_pass_on_differences_remembers_its_share():
         ({"counts": {"y": 10}}, "counts names coordinates, got 'y'"),
         ({"counts": 0}, "numbers above 0, got 0 for 'x_1'"),
         ({"start": {X: float("nan")}}, "a finite number was needed"), ({"start": {X: []}}, "a number was needed"),
+        ({"actuator": {"gian": 2.0}}, r"no number 'gian'; did you mean 'gain'\? \(it has gain, "),
         ({"law": object()}, "closes the loop by gains, a Law or a Rule, got object"),
         ({"law": [[1.0, 2.0], [3.0, 4.0]]}, r"gains for Rectilinear1 need shape \(1, 2\), got \(2, 2\)"),
     ],

@@ -55,8 +55,8 @@ def in_javascript(plant: Drawn) -> str:
         return ""
     line = '["{}", [{}]]'
     body = ", ".join(line.format(name, ", ".join(_point(p) for p in points)) for name, points in lines)
-    given = "; ".join(f"const q{i} = q[{i}]" for i in range(len(symbols)))
-    return f"(q) => {{ {given}; return [{body}]; }}"
+    constants = "; ".join(f"const q{i} = q[{i}]" for i in range(len(symbols)))
+    return f"(q) => {{ {constants}; return [{body}]; }}"
 
 
 def _point(point: Sequence[Any]) -> str:

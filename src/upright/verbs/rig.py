@@ -11,7 +11,7 @@ from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, page_folder, write_page
-from upright.verbs.values import si_if_given
+from upright.verbs.values import path_of, si_if_given
 
 if TYPE_CHECKING:
     from upright.realtime.jitter import Jitter
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
         "reference": 'That the law follows: "square 0.3 8".',
         "duration": "How long.",
     },
-    wrong=lambda done: not done.value.sound,  # whether it ran, whatever its model is worth
+    wrong=lambda answer: not answer.value.sound,  # whether it ran, whatever its model is worth
     more="""
     Space, q, Esc or Ctrl-C stop it: zero first.
     This is software, not a rated safety function: keep a stop in hardware within reach.
@@ -102,7 +102,8 @@ def run(
     folder = page_folder(out, pdf)
     leaning = si_if_given(tilt, "rad") or 0.0
     request = RunRequest(
-        rig=Path(rig), law=None if law is None else Path(law), excite=excite, reference=reference, seconds=duration,
+        rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
+        excite=excite, reference=reference, seconds=duration,
         mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
     )  # fmt: skip
     result = run_rig(request, folder, watch=observe)
@@ -115,7 +116,7 @@ def run(
     name="rig check",
     metavars={"rate": "HZ"},
     defaults={"out": "rig-check"},
-    wrong=lambda done: not done.chapter.sound,
+    wrong=lambda answer: not answer.chapter.sound,
     more="""
     Measure with everything running that will run beside the loop.
 
@@ -177,7 +178,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     metavars={"rig": "RIG.toml"},
     helps={"rig": "What the rig is, and how far it may go."},
     prepare=_for_hardware,
-    wrong=lambda done: not done.chapter.sound,
+    wrong=lambda answer: not answer.chapter.sound,
     more="""
     Let the rig hang freely, with nobody in its way: the pulse moves it.
 
@@ -218,5 +219,6 @@ def rig_doctor(
     from upright.running.chapter import checkup_chapter
     from upright.running.doctor import check_up
 
-    checkup = check_up(Path(rig), hand=hand, clear=clear, pulse=pulse)
-    return Answer(checkup, checkup_chapter(checkup, typed(Path(rig))))
+    file = path_of(rig, "a rig on hardware")
+    checkup = check_up(file, hand=hand, clear=clear, pulse=pulse)
+    return Answer(checkup, checkup_chapter(checkup, typed(file)))

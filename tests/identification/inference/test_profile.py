@@ -123,3 +123,23 @@ def test_where_the_cost_never_rises_enough_the_standard_error_or_a_wall_ends_the
     )  # fmt: skip
     found = profile(best, 0, Estimate(value=0.0, stderr=1.0, interval=(-7.0, 8.0)), 1.0, SearchLog())
     assert found == (pytest.approx(low, rel=0.05), pytest.approx(high, rel=0.05))
+
+
+@pytest.mark.parametrize(("level", "plain_stands"), [(None, False), (0.2, True)])
+def test_a_number_sought_by_its_logarithm_has_the_exponentials_of_the_ends_or_the_plain_interval(
+    level: float | None, plain_stands: bool
+) -> None:
+    """About 1, whose logarithm is 0; a cost that never rises has no end."""
+    u = Unknown(name="x", runs=(), value=1.0, lower=0.0, upper=math.inf, log=True, scale=1.0)
+    one = np.ones((1, 1))
+    problem = Valley([u]) if level is None else Flat([u], level)
+    best = Optimum(
+        problem=problem, x=np.zeros(1), covariance=one, sandwich=one, white=np.ones(1), matrix=one, variance=1.0,
+        memory=0.0, samples=1e6, pinned=np.zeros(1, dtype=bool),
+    )  # fmt: skip
+    found = profile(best, 0, Estimate(value=1.0, stderr=1.0, interval=(0.25, 9.0)), 1.0, SearchLog())
+    if plain_stands:
+        assert found == (0.25, 9.0)
+    else:
+        end = brentq(lambda x: Valley.height(x) - 1, 1.0, 2.0)
+        assert found == pytest.approx((math.exp(-end), math.exp(end)), rel=0.03)

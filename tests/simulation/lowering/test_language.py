@@ -172,6 +172,32 @@ def test_a_loop_over_lanes_gives_every_lane_its_own(lanes):
     assert np.array_equal(out, by_hand)
 
 
+SUMS = """
+@entry
+def entered(W, OUT):
+    _some = 0.0
+    _less = 100.0
+    _all = 0.0
+    for _i in range(16):
+        if W[_i] > 3.0:
+            _some += W[_i]
+        _less -= W[_i]
+        _all += 2.0 * W[_i]
+    OUT[0], OUT[1], OUT[2] = _some, _less, _all
+"""
+
+
+@pytest.mark.parametrize("lanes", [1, 2, 4, 8])
+def test_what_lanes_add_up_to_counts_those_that_the_condition_lets_in(lanes):
+    """Of 0 to 15: all above 3 are 114, all of them 120."""
+    raw = np.zeros(40)
+    first = (-raw.ctypes.data // 8) % 8
+    W, out = raw[first : first + 16], np.zeros(3)
+    W[:] = np.arange(16.0)
+    compiled(SUMS, lanes=lanes)(W, out)
+    assert out.tolist() == [114.0, -20.0, 240.0]
+
+
 def test_whole_numbers_divide_by_zero_without_stopping_the_process():
     def divided(OUT, n, m):
         OUT[0] = n // m

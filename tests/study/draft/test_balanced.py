@@ -79,6 +79,15 @@ def test_a_reversed_drive_is_told_upright_too(drafted):
     assert "sign = -1   # the first" in text
 
 
+@pytest.mark.parametrize(("scale", "reversed_"), [(100.0, False), (-100.0, True)])
+def test_a_drive_that_pulls_by_little_is_not_taken_for_reversed(drafted, scale, reversed_):
+    """A hundred times the command for the same motion: 0.28 rad/s^2 per volt, which is above nothing."""
+    psi, theta, u = balanced()
+    text, _ = drafted(t=T, voltage=scale * u, psi=psi, theta=theta)
+    assert "balanced upright" in text
+    assert ("sign = -1   # the first" in text) == reversed_
+
+
 def test_a_hanging_pendulum_under_the_same_effort_hangs(drafted):
     psi, theta, u = balanced(up=-1.0)
     text, study = drafted(t=T, voltage=u, psi=psi, theta=theta)

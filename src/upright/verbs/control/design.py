@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,9 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import Start, read_pole_list, read_start, si_if_given
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from upright.designing.run import Designed
     from upright.rig import Rig
     from upright.systems import StateSpace
@@ -71,7 +75,8 @@ def design(
     at : str, optional
         Equilibrium; the last that the plant names when omitted.
     poles : str or sequence of complex
-        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``; proposed when neither these nor weights are given.
+        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``, or ``"set 3"`` of Table 1 as in `regulate`; proposed when
+        neither these nor weights are given.
     lqr : str or sequence of float
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
     effort_weight : float, optional
@@ -110,7 +115,7 @@ def design(
     from upright.rig.completion import completed
 
     folder_at, on = folder_if_given(out, pdf), known_options(DesignOptions, on, "design")
-    requested, weights = _poles(poles), _numbers(lqr)
+    requested, weights = _pole_set(poles), _numbers(lqr)
     if requested is not None and weights is not None:
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states), not both.')
     if (source is None) == (matrices is None):
@@ -154,6 +159,18 @@ def design(
             *write_page(page, folder_at / "design.html", pdf),
         ]
     return Answer(designed, page, files)
+
+
+def _pole_set(poles: str | Iterable[complex]) -> NDArray[np.complex128] | None:
+    """Poles that were asked for, those of a set of Table 1 by its name."""
+    name = re.fullmatch(r"\s*set\s*(\w+)\s*", poles, re.IGNORECASE) if isinstance(poles, str) else None
+    if name is None:
+        return _poles(poles)
+    from upright.experiments.regulation_2.run import SETS
+
+    if f"set {name[1]}" not in SETS:
+        raise BadInput(f"--poles \"set N\" takes 1 to {len(SETS)} of Table 1, got '{name[1]}'.")
+    return _poles(SETS[f"set {name[1]}"])
 
 
 def _sampling(model: StateSpace, period: float | str | None) -> float:

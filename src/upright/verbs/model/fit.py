@@ -213,11 +213,11 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | 
     from upright.report.page import Chapter, Part
 
     worst = min((v for s in runs.values() for v in s.fit_percent.values()), default=float("nan"))
-    kept = promise(runs, bands)
+    promised = promise(runs, bands)
     part = Part("How much of each signal is explained", (score_table(runs),))
     chapter = Chapter(
-        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {kept.sentence}", parts=(part,),
-        sound=kept.holds, warnings=tuple(sentence for s in runs.values() for sentence in s.beyond),
+        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {promised.sentence}",
+        parts=(part,), sound=promised.holds, warnings=tuple(sentence for s in runs.values() for sentence in s.beyond),
         numbers={
             label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside}
             for label, s in runs.items()
