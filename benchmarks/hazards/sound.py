@@ -17,13 +17,13 @@ import numpy as np
 
 from benchmarks.hazards.abreast import Twins
 from benchmarks.hazards.story import POLES
+from upright.control.still import StillDrive, StillPendulum
 from upright.control.watch import Watch
 from upright.experiments.nonideal import nonideal
 from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.rig import Rig
 from upright.rig.makes import make_rig
-from upright.rigs.driven import StillDrive, StillPendulum
 
 MAKES = ("furuta", "linear")
 FAR = {"furuta": 0.4, "linear": 0.05}

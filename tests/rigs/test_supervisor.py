@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from upright.control.still import UNSEEN, StillDrive
 from upright.errors import BadInput, RigStopped
 from upright.gains import feedback, filtered, place
 from upright.laws import Rule, state_feedback
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Fault, Limits, Mode, TwinPort
-from upright.rigs.driven import UNSEEN, StillDrive
 from upright.rigs.supervisor import PLAIN, PULSES, Duty, Supervisor
 from upright.simulation import simulate
 

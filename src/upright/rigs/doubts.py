@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from upright.control.still import StillDrive, StillPendulum
 from upright.control.watch import Suspicion, Watch
 from upright.rig import Rig
-from upright.rigs.driven import StillDrive, StillPendulum
 from upright.rigs.protocol import Fault
 
 

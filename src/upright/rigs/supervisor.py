@@ -365,12 +365,12 @@ class Supervisor:
             return False
         zero = model.plant.equilibrium(self.duty.zero or None)
         offset = np.array([zero[c.name] for c in model.plant.coordinates])
-        seen: list[Tick] = []
+        ticks: list[Tick] = []
         with suppress(RigStopped):  # a rig that does not answer shows nothing
             for _ in range(round(LOOKED / self.about.period)):
-                seen.append(self.rig.exchange(0.0))
-        q = np.array([self.readings(tick) for tick in seen]).reshape(len(seen), len(offset)) + offset
-        return energy_risen(model, [tick.time for tick in seen], q)
+                ticks.append(self.rig.exchange(0.0))
+        q = np.array([self.readings(tick) for tick in ticks]).reshape(len(ticks), len(offset)) + offset
+        return energy_risen(model, [tick.time for tick in ticks], q)
 
     def _await_rest(self, patience: float = 30.0) -> None:
         """Wait with the power stage off, so that nothing drives what is still moving."""
