@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -38,8 +39,18 @@ def test_a_fit_plays(tmp_path):
     motion = up.simulate(RIG, u=u, at="hanging", seconds=6.0)
     fit = up.identify(motion, up.Furuta, known={"m_p": 0.135, "r": 0.16, "actuator.gain": 0.65}, columns={"T": "T"})
     played = fit.play(limit="3 V", period="2 ms", counts=4096, draws=16, out=tmp_path / "play.html")
-    assert played.numbers["held"] == 16
+    assert int(played.held.sum()) == 16
     assert (tmp_path / "play.html").stat().st_size < 150_000
+
+
+def test_of_a_model_that_is_not_trusted_no_share_is_told_as_the_rig_s():
+    from upright.basis import NOT_TRUSTED, Basis
+
+    doubted = replace(RIG, basis=Basis(level=NOT_TRUSTED, sentence="It does not predict."))
+    played = up.play(doubted, draws=16)
+    assert played.numbers["held"] == "not supported"
+    assert played.chapter.verdict.startswith("Do not rely on this")
+    assert ">Of the rig not supported; of the model: 16 of 16 rigs" in played.page
 
 
 @pytest.mark.slow

@@ -226,7 +226,7 @@
   const tell = (words) => {
     const counts = ORDER.map((w) => words.filter((v) => v === w).length), of = words.length;
     const parts = ORDER.map((w, i) => `${counts[i]} ${WORD[w]}`).filter((_, i) => counts[i]);
-    $("share").textContent = `${of - counts[2]} of ${of} rigs are stabilised${parts.length > 1 ? `: ${parts.join(", ")}` : ""}.`;
+    $("share").textContent = `${DATA.said}${of - counts[2]} of ${of} rigs are stabilised${parts.length > 1 ? `: ${parts.join(", ")}` : ""}.`;
     cells.replaceChildren();
     cells.setAttribute("aria-label", $("share").textContent);
     const per = 25;

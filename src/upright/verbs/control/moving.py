@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from upright.basis import NOT_SUPPORTED, Basis
 from upright.errors import BadInput, UprightError
 from upright.verbs.answer import Answer
 from upright.verbs.options import HoldingOptions, known_options, rig_entries
@@ -56,10 +57,11 @@ def played(
     )  # fmt: skip
     held = int(scored.held.sum())
     chapter = Chapter(
-        title=f"The {rig.name} in a page", verdict=_verdict(held, draws), sound=held > 0.95 * draws,
+        title=f"The {rig.name} in a page", verdict=_verdict(held, draws, known.basis), sound=held > 0.95 * draws,
         warnings=tuple(doubts(known, rig)),
         steps=(Step("Open the page in a browser, push the pendulum, drag the poles."),),
-        numbers={"held": held, "draws": draws, "seed": seed} | ({} if path is None else {"page": str(path)}),
+        numbers={"held": known.basis.supported(held), "draws": draws, "seed": seed}
+        | ({} if path is None else {"page": str(path)}),
     )  # fmt: skip
     files = [] if path is None else [replace_file(path, text.encode())]
     return Played(scored, resting_on(chapter, known.basis, SIMULATED), files, text)
@@ -129,16 +131,24 @@ def live_page(
     held = int(scored.held.sum())
     blind = () if known.draws else ("The fit has no covariance: only dry friction and the hand vary.",)
     text = page(
-        moving(rig, loop, task, others=others, lanes=draws, seed=seed), rig.plant,
-        headline=known.basis.qualified(_verdict(held, draws)),
+        moving(rig, loop, task, others=others, lanes=draws, seed=seed) | {"said": _of_model(known.basis)}, rig.plant,
+        headline=known.basis.qualified(_verdict(held, draws, known.basis)),
         cautions=[c for c in (known.basis.first_line(), *blind, *doubts(known, rig)) if c],
-        share=f"{held} of {draws} rigs are stabilised for {seconds:g} s.", numbers=_numbers(rig),
+        share=f"{_of_model(known.basis)}{held} of {draws} rigs are stabilised for {seconds:g} s.",
+        numbers=_numbers(rig),
         start=f"{math.degrees(let_go['theta']):.3g}° at {let_go['theta_dot']:.2g} rad/s", seed=seed,
     )  # fmt: skip
     return text, scored
 
 
-def _verdict(held: int, draws: int) -> str:
+def _of_model(basis: Basis) -> str:
+    """What stands before the share of rigs of a model that is not trusted."""
+    return "" if basis.supports else f"Of the rig {NOT_SUPPORTED}; of the model: "
+
+
+def _verdict(held: int, draws: int, basis: Basis) -> str:
+    if not basis.supports:
+        return f"How many rigs the law stabilises is {NOT_SUPPORTED}: the model is not known to be the rig."
     return f"The law stabilises {held} of {draws} rigs that the fit allows."
 
 
