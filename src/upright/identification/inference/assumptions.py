@@ -90,8 +90,9 @@ def _factors(a: Assumption, name: str) -> tuple[float, float]:
     if math.isnan(power):  # not evaluated
         return 1.0, 1.0
     ends = [end / a.value if a.value else math.exp(end / a.size) if a.size else 1.0 for end in a.range]
-    factors = sorted(max(end, SMALL) ** power for end in ends)
-    return min(1.0, factors[0]), max(1.0, factors[-1])
+    most = -math.log(SMALL)  # what follows by a high power is anything
+    steps = [min(max(power * math.log(max(end, SMALL)), -most), most) for end in ends]
+    return math.exp(min(0.0, *steps)), math.exp(max(0.0, *steps))
 
 
 def _over_ranges(interval: tuple[float, float], name: str, rested: Sequence[Assumption]) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -14,6 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.control.moving import live_page, live_part
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
 from upright.verbs.options import DesignOptions, above_zero, as_typed, known_options, rig_entries
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from upright.designing.run import Designed
+    from upright.report.page import Part
     from upright.rig import Rig
     from upright.systems import StateSpace
 
@@ -154,9 +157,14 @@ def design(
     page = chapter(designed, source=name + as_typed(on), folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
+        moves: tuple[Part, ...] = ()
+        if (on_rig := request.on) is not None and request.at == "inverted" and request.speed != "kalman":
+            how = {"seed": seed, "speed": request.speed, "memory": request.memory}
+            page_of: Any = partial(live_page, on_rig, on_rig, designed.continuous, **how)
+            moves = live_part(on_rig.name, lambda: page_of()[0])
         files = [
             write_json(folder_at / "design.json", page.numbers),
-            *write_page(page, folder_at / "design.html", pdf),
+            *write_page(replace(page, parts=(*page.parts, *moves)), folder_at / "design.html", pdf),
         ]
     return Answer(designed, page, files)
 

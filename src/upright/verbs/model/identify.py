@@ -166,6 +166,7 @@ def identify(
     from upright.report.symbols import typed
     from upright.study.results import fit_content, write_fit
     from upright.study.windows import windows
+    from upright.verbs.control.moving import live_part
     from upright.verbs.pages import folder_if_given, write_page
     from upright.workers import Workers
 
@@ -206,9 +207,12 @@ def identify(
         crossed=crossed, study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
         folder=typed(folder) if folder is not None else "OUT", windows=windows(requested.runs),
     )  # fmt: skip
+    page = replace(page, numbers=fit_content(fit, requested, crossed))
+    answer = FitAnswer(fit, page, written, requested, crossed)
     if folder is not None and (report or pdf):
-        written += write_page(page, folder / "report.html", pdf)
-    return FitAnswer(fit, replace(page, numbers=fit_content(fit, requested, crossed)), written, requested, crossed)
+        moves = live_part(requested.title or "rig", lambda: answer.play().page)
+        written += write_page(replace(page, parts=(*page.parts, *moves)), folder / "report.html", pdf)
+    return FitAnswer(fit, page, written, requested, crossed)
 
 
 def requested_study(source: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
