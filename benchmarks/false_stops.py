@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.hazards.abreast import Twins
+from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.sound import MAKES, Breaking, Lane, Played
 from benchmarks.measure import Line, Target, page
 from upright.rig.makes import make_rig
