@@ -84,10 +84,10 @@ def neglected(best: Optimum) -> Neglected | None:
     curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
     if not curvature > 0 or not slope**2 > FELT * here.cost * curvature:
         return None
-    neglected_terms = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-4, limit=FITTED)
-    if neglected_terms.interrupted:
+    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-4, limit=FITTED)
+    if end.interrupted:
         raise KeyboardInterrupt
-    there = assess(wider, neglected_terms.x)
+    there = assess(wider, end.x)
     size = estimate(there, x.size)
     if there.lost or not abs(size.value) > SHOWN * size.stderr:
         return None
@@ -99,11 +99,11 @@ def neglected(best: Optimum) -> Neglected | None:
     )  # fmt: skip
 
 
-def with_force(bands: Bands, neglected_terms: Neglected) -> Bands:
+def with_force(bands: Bands, force: Neglected) -> Bands:
     """Bands that hold what the force does to a prediction, by itself and through the numbers that it moves."""
-    together: Mapping[str, float] = dict(zip(neglected_terms.names, neglected_terms.moves, strict=True))
-    step = np.append([together.get(n, 0.0) for n in bands.names], neglected_terms.force.value)
+    together: Mapping[str, float] = dict(zip(force.names, force.moves, strict=True))
+    step = np.append([together.get(n, 0.0) for n in bands.names], force.force.value)
     C = np.zeros((step.size, step.size))
     C[:-1, :-1] = bands.covariance
-    C[-1, -1] = neglected_terms.force.stderr**2
+    C[-1, -1] = force.force.stderr**2
     return replace(bands, names=(*bands.names, OFFSET), covariance=C + np.outer(step, step))
