@@ -395,3 +395,10 @@ def test_a_rig_is_called_by_its_file_where_a_make_alone_describes_it_too(tmp_pat
     model, truth = described(read_rig_file(tmp_path / "RIG.toml"))
     assert model.name == (name or make_rig("furuta").name)
     assert truth.name == make_rig("furuta").name
+
+
+@pytest.mark.parametrize(("start", "degrees"), [("", 3.0), ("0 deg", 0.0), ("5 deg", 5.0)])
+def test_a_twin_begins_off_upright_unless_somebody_says_otherwise(folder, tmp_path, start, degrees):
+    answer = up.run(folder / "RIG.toml", law=folder / "design.json", duration=0.1, start=start, out=tmp_path)
+    log, target = answer.value.log, answer.value.end.target
+    assert log.columns["theta"][0] - target[1] == pytest.approx(math.radians(degrees), abs=2 * math.pi / 2000)
