@@ -127,12 +127,12 @@ def _let_go(start: Start | float, rig: Path, *, law: bool) -> float:
         return float(start)
     from upright.basis import SIMULATED
     from upright.rigs.rigfile import read_rig_file
-    from upright.running.rig import described
+    from upright.running.rig import model_and_truth
 
     file = read_rig_file(rig)
     if not start and not (law and file.performed == SIMULATED):
         return 0.0
-    model, _ = described(file)
+    model, _ = model_and_truth(file)
     last, unit = model.states[-2], model.state_units[-2]
     if not start:
         return math.radians(TAP) if unit == "rad" else 1e-3 * TAP
