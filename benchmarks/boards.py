@@ -6,7 +6,7 @@ import math
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +67,39 @@ class Board:
         self.process.stdout.close()
 
 
-def rig_on(line: str | Line, **how: Any) -> SerialRig:
+class PicoLine:
+    """The wire of an emulated Pico: what is written is answered before the call ends, in the board's own time."""
+
+    name = "its port"
+
+    def __init__(self, board: Board) -> None:
+        self._board, self._data = board, b""
+
+    def write(self, data: bytes) -> None:
+        self._data += bytes.fromhex(self._board.say(f"w {data.hex()}").partition(" ")[2])
+
+    def read(self, patience: float) -> bytes:
+        data, self._data = self._data, b""
+        return data
+
+    def close(self) -> None:
+        """It is the board's."""
+
+
+def pico(folder: Path, drive: str) -> Board:
+    """A Raspberry Pi Pico's own image on rp2040js, with a simple rig."""
+    return Board("node", FIRMWARE / "picosim.cjs", folder / f"pico-{drive}.uf2", drive)
+
+
+def no_pico() -> str:
+    """Why no Pico can be emulated here: rp2040js is found by NODE_PATH (npm install rp2040js@1.4.1)."""
+    if shutil.which("node") is None:
+        return "node is missing"
+    found = subprocess.run(["node", "-e", 'require("rp2040js")'], capture_output=True, check=False)
+    return "rp2040js is missing (npm install rp2040js@1.4.1, and NODE_PATH)" if found.returncode else ""
+
+
+def rig_on(line: str | Line | Callable[[], Line], **how: Any) -> SerialRig:
     """A rig with ECP's encoders and converter at the end of a line, as patient as a busy machine needs.
 
     It is greeted alike each time: how long a processor takes over a frame depends on its bytes.

@@ -1,6 +1,6 @@
 """Build what is computed in this folder: `python -m docs [NAMES] [--check]`.
 
-Notebooks are run and store what they show, the nomenclature is written from the plants. With --check nothing is
+Notebooks are run and store what they show, the nomenclature is written from the plants, drawings from pin tables. With --check nothing is
 written: it says which cells no longer run, or say something else than what is stored.
 """
 
@@ -13,6 +13,7 @@ from pathlib import Path
 import nbformat
 
 from docs import nomenclature
+from docs.drawings import IMAGES, drawings
 from docs.notebook import CellFailed, differences, executed
 
 HERE = Path(__file__).parent
@@ -30,7 +31,7 @@ def main() -> int:
     )
     asked = ask.parse_args()
     names = asked.names or sorted(path.stem for path in HERE.glob("*.ipynb"))
-    failed = False if asked.names else _nomenclature(asked.check)
+    failed = not asked.names and (_nomenclature(asked.check) | _drawings(asked.check))
     for name in names:
         path = HERE / f"{name}.ipynb"
         if not path.is_file():
@@ -61,6 +62,20 @@ def _nomenclature(check: bool) -> bool:
     if stale:
         print("nomenclature.md is out of date; run python -m docs.", file=sys.stderr)
     return stale
+
+
+def _drawings(check: bool) -> bool:
+    """Draw wires and rigs; when only checked, whether a drawing is out of date."""
+    stale = [
+        n
+        for n, svg in drawings().items()
+        if not (IMAGES / n).is_file() or (IMAGES / n).read_text("utf-8") != svg
+    ]
+    for name in [] if check else stale:
+        (IMAGES / name).write_text(drawings()[name], encoding="utf-8")
+    if check and stale:
+        print(f"{', '.join(stale)}: out of date; run python -m docs.", file=sys.stderr)
+    return check and bool(stale)
 
 
 if __name__ == "__main__":

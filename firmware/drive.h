@@ -8,5 +8,13 @@
 #define DRIVE DRIVE_ANALOG
 #endif
 
+#if DRIVE == DRIVE_ANALOG
+#define DRIVE_NAME "analog"
+#elif DRIVE == DRIVE_PAIR
+#define DRIVE_NAME "two PWM lines"
+#else
+#define DRIVE_NAME "PWM and sign"
+#endif
+
 void drive_prepare(void); /* at zero, before anything else */
 #endif

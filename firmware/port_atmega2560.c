@@ -20,13 +20,6 @@ interrupts on ports that Arduino spreads, and no third timer for PWM: take a Meg
 #define TIMER_DIVIDER 8
 #define BLINK_TICKS 256 /* a power of two */
 
-#if DRIVE == DRIVE_ANALOG
-#define DRIVE_NAME "analog"
-#elif DRIVE == DRIVE_PAIR
-#define DRIVE_NAME "two PWM lines"
-#else
-#define DRIVE_NAME "PWM and sign"
-#endif
 const char port_name[] = "upright firmware, ATmega2560, " DRIVE_NAME;
 bool port_virtual = false;
 const uint16_t port_period = PERIOD_US;

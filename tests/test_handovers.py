@@ -197,9 +197,12 @@ def test_gains_that_do_not_hold_the_plant_are_told():
         up.simulate(RIG, 40 * np.ones((1, 4)), at="inverted", start={"theta": 0.1}, seconds=60)
 
 
+DRIVEN = up.Rig.known(RIG, gain="0.65 N m/V", limit="10 V", period="2 ms", counts=4096)
+SWING = up.simulate(RIG, start={"theta": 0.3}, seconds=2)
 ANYTHING = st.one_of(
     st.none(), st.booleans(), st.integers(-3, 3), st.floats(allow_nan=True), st.text(max_size=6), st.just([]),
-    st.just({}), st.just(object()), st.just(up.Furuta), st.just(RIG), st.just(np.zeros((2, 3))), st.just(np.zeros(0)),
+    st.just({}), st.just(object()), st.just(up.Furuta), st.just(RIG),
+    st.just(DRIVEN), st.just(np.zeros((2, 3))), st.just(np.zeros(0)),
     st.just((np.eye(2), np.ones(2))), st.just(RIG.linear("inverted")), st.just([[1, "a"]]), st.just({"theta": "5 kg"}),
     st.just({"psi": None}), st.just(control.tf([1], [1, 1])),
 )  # fmt: skip
@@ -226,6 +229,29 @@ CALLS = {
     "survey": lambda a, b: up.survey(a),
     "export": lambda a, b: up.export(a, to="mjcf"),
     "show": lambda a, b: up.show(a),
+    "identify": lambda a, b: up.identify(a, b),
+    "identify a log": lambda a, b: up.identify(SWING, a if a is not None else 3, known=b),
+    "frequency": lambda a, b: up.frequency(a, rig=b if isinstance(b, str) else ""),
+    "loadings": lambda a, b: up.loadings(a),
+    "swing_up": lambda a, b: up.swing_up(a if a is not None else 3),
+    "init": lambda a, b: up.init(a),
+    "law": lambda a, b: up.law(a),
+    "read": lambda a, b: up.read(a),
+    "lab": lambda a, b: up.lab(rig=a if isinstance(a, str) and a else np.zeros(2)),
+    "run": lambda a, b: up.run(a, law=b),
+    "rig_doctor": lambda a, b: up.rig_doctor(a),
+    "log_show": lambda a, b: up.log_show(a),
+    "log_replay": lambda a, b: up.log_replay(a),
+    "export a law": lambda a, b: up.export(a, to=b),
+    "start of a design": lambda a, b: up.design(DRIVEN, poles=POLES, start=a),
+    "start of a chance": lambda a, b: up.chance(DRIVEN, [1.0, 1.0, 1.0, 1.0], start=a, draws=2),
+    "a rig": lambda a, b: up.Rig.known(a, gain=b),
+    "numbers of a rig": lambda a, b: DRIVEN.replace(limit=a, counts=b),
+    "a rig's plant": lambda a, b: DRIVEN.replace(plant=a, travel=b),
+    "equilibrium": lambda a, b: DRIVEN.linear(a),
+    "limit of a motion": lambda a, b: up.simulate(DRIVEN, limit=a, counts=b, seconds=0.01),
+    "drive of a motion": lambda a, b: up.simulate(RIG, actuator=a, memory=b, seconds=0.01),
+    "counts of a design": lambda a, b: up.design(DRIVEN, poles=POLES, counts=a, limit=b),
 }
 
 
@@ -240,3 +266,14 @@ def test_whatever_a_verb_is_given_it_answers_or_says_in_a_sentence(verb, tmp_pat
             CALLS[verb](a, b)
 
     check()
+
+
+def test_an_array_of_gains_for_a_force_is_not_taken_for_gains_of_a_command():
+    """The drive turns the command round, so that what stabilises the plant by its force drives the rig away."""
+    turned = DRIVEN.replace(gain="-0.65 N m/V")
+    by_force = np.array(up.place(RIG.linear("inverted"), [-4 + 2j, -4 - 2j, -17, -3]).K)
+    with pytest.raises(up.BadInput, match=r"by a force \[N m\], and not the rig by its command \[V\]"):
+        up.simulate(turned, by_force, at="inverted", start={"theta": 0.02})
+    held = up.simulate(turned, by_force / -0.65, at="inverted", start={"theta": 0.02}, seconds=4)
+    assert abs(held["theta"][-1] - np.pi) < 0.01
+    assert abs(up.simulate(RIG, by_force, at="inverted", start={"theta": 0.02}, seconds=4)["theta"][-1] - np.pi) < 0.01

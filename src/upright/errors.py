@@ -41,7 +41,7 @@ def nearest(name: str, valid: object) -> str:
     from difflib import get_close_matches
 
     names = [str(v) for v in valid]  # type: ignore[attr-defined]
-    close = get_close_matches(name[:100], names, n=1, cutoff=0.6)
+    close = get_close_matches(str(name)[:100], names, n=1, cutoff=0.6)
     if close:
         return f"did you mean '{close[0]}'?"
     more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""

@@ -167,7 +167,7 @@ def whole_file(path: PathLike) -> Generator[Path]:
 def _aside(path: Path) -> tuple[Path, int | None]:
     """A new empty file beside another, and the permissions that it is to have in the end, where it replaces one.
 
-    Nobody can foresee its name, and a link or a file that is there already is refused, not followed. Unlike those of
+    Its name is unpredictable, and a link or a file that is there already is refused, not followed. Unlike those of
     `tempfile.mkstemp`, its permissions are those of any new file, but for one that replaces a more private one.
     """
     mode = None

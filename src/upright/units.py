@@ -107,7 +107,12 @@ def parse_if_given(text: str, expected: str) -> float | None:
 
 def in_unit(value: float | str, unit: str) -> float:
     """Number in `unit`: a text is converted, a plain number is taken to be in it."""
-    return parse(value, unit) / scale(unit) if isinstance(value, str) else float(value)
+    if isinstance(value, str):
+        return parse(value, unit) / scale(unit)
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise BadInput(f"A number in {unit or '1'} was needed, or a text with its unit, got {value!r:.40}.") from None
 
 
 def uncertainty(text: str, value: float, unit: str) -> float:
@@ -131,6 +136,16 @@ def scale(unit: str) -> float:
         When the unit is unknown.
     """
     return _si(unit)[0]
+
+
+PARTS = {1e-2: 1e2, 1e-3: 1e3, 1e-6: 1e6, 1e-9: 1e9}
+"""Factors of decimal prefixes that float64 does not hold, and what divides as they multiply."""
+
+
+def converted(value: Any, factor: float) -> Any:
+    """A number or an array times a factor; 9750 times a thousandth is then 9.75 to the last bit, as it is written."""
+    per = PARTS.get(abs(factor))
+    return value * factor if per is None else value / math.copysign(per, factor)
 
 
 def same_dimension(unit: str, other: str) -> bool:

@@ -110,6 +110,29 @@ def test_a_fitted_model_scores_another_study(fitted):
     assert json.loads((fitted[0] / "scores" / "prediction.json").read_text(encoding="utf-8"))["runs"] == scores
 
 
+def test_a_log_that_was_fitted_is_no_prediction_and_one_that_was_held_out_is(fitted):
+    outcome = run("predict", "out/fit.json", "one.csv")  # a log, without a study
+    assert "This is no prediction: the fit has seen 'log' (as 'one')." in outcome.stdout
+    assert outcome.exit_code == 3
+    held_out = run("predict", "out/fit.json", "two.csv")
+    assert "the fit has seen" not in held_out.stdout
+    assert held_out.exit_code == 0
+    both = run("predict", "out/fit.json", "study.toml")
+    assert "Verdict: The fit has seen 'one'." in both.stdout
+    assert both.exit_code == 0
+
+
+def test_the_tail_of_a_fitted_log_is_a_prediction(bench):
+    """The same file, and no second of it in common."""
+    text = STUDY.replace('file = "one.csv"', 'file = "one.csv"\nwindow = [0, 8.0]').split('[[runs]]\nlabel = "two"')[0]
+    (bench / "study.toml").write_text(text, encoding="utf-8")
+    assert run("identify", "study.toml", "-o", "out").exit_code == 0
+    for window, seen in (("[8.5, 14.9]", False), ("[7.0, 14.9]", True)):
+        (bench / "tail.toml").write_text(text.replace("[0, 8.0]", window), encoding="utf-8")
+        outcome = run("predict", "out/fit.json", "tail.toml", "--json")
+        assert bool(json.loads(outcome.stdout)["seen_in_the_fit"]) == seen
+
+
 def test_prediction_needs_no_parameters_in_its_study(fitted):
     folder = fitted[0]
     head, _, tail = STUDY.partition("[parameters]")
@@ -195,7 +218,7 @@ def test_init_does_not_overwrite_unless_told(bench):
         (["identify", "study.toml", "--method", "simplx"], "did you mean 'simplex'?"),
         (["identify", "study.toml", "-o", "one.csv"], "one.csv is a file"),
         (["identify", "study.toml", "--data", "nowhere"], "nowhere"),
-        (["identify", "known.toml"], "give a parameter a guess"),
+        (["identify", "known.toml"], "give one a guess"),
         (["identify", "unseen.toml"], "at least one needs role"),
         (["predict", "gone.json", "study.toml"], "upright predict OUT/fit.json STUDY.toml"),
         (["predict", "study.toml", "study.toml"], "no fit.json"),

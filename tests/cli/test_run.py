@@ -26,7 +26,7 @@ def bench(tmp_path, monkeypatch):
 
 
 def test_a_run_tells_what_came_and_what_to_do_next(bench):
-    words = ["run", "--rig", "RIG.toml", "--law", "design.json", "--duration", "1", "--tilt", "3 deg"]
+    words = ["run", "--rig", "RIG.toml", "--law", "design.json", "--duration", "1", "--start", "3 deg"]
     done = RUNNER.invoke(app, words)
     assert done.exit_code == 0, done.output
     for text in ("Stabilised for 1 s", "none late", "upright log replay", "run.mcap"):

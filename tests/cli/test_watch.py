@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import sys
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ from upright.cli.sentences import sentences
 from upright.cli.watch import effort_bar, lines, view
 from upright.errors import RigStopped, nearest
 from upright.progress import part
-from upright.realtime.session import RunState
+from upright.realtime.session import RunScene, RunState
 from upright.report.page import Chapter
 from upright.rigs.board import fault_text
 from upright.rigs.protocol import Fault, Mode
@@ -50,6 +51,21 @@ def test_a_run_shows_its_time_deviations_command_and_what_is_wrong():
     assert red == {"3 late", fault_text(fault)}
     assert not any("red" in str(s.style) for s in text.spans)
     assert lines(RunState(phase="waiting for you"), 1.0).plain == "Waiting for you\nspace, q or Esc: stop"
+
+
+def test_a_view_names_readings_units_limit_and_the_time_that_is_left():
+    scene = RunScene(
+        readings=(("x", "m"), ("theta", "rad")), command_unit="V", limit=10.0, seconds=6.0
+    )  # fmt: skip
+    state = RunState(
+        phase="running", time=1.5, mode=Mode.HOST, applied=-2.5, readings=(0.25, -math.pi / 6), scene=scene
+    )
+    first, away, command, _ = lines(state, 3.0).plain.splitlines()
+    assert first.startswith("    1.50 s, 4.5 s left  HOST")
+    assert away == "away x   +0.2500 m  theta   -30.00 deg"
+    # a quarter of the limit fills a quarter of the bar, whatever the largest command so far
+    assert command == f"command   -2.500 of 10 V {effort_bar(-2.5, 10.0)}"
+    assert "0.0 s left" in lines(replace(state, time=6.5), 3.0).plain
 
 
 def test_parts_of_a_work_tell_their_share_of_the_whole():

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.boards import Board, build
+from benchmarks.boards import Board, build, no_pico
+from benchmarks.boards import pico as emulated
 
 Start = Callable[..., Board]
 
@@ -51,6 +52,22 @@ def avr(built: Callable[[str, str], Path]) -> Iterator[Start]:
     def start(*arguments: str, drive: str = "analog") -> Board:
         image = folder / f"atmega2560-{drive}.elf"
         boards.append(Board(folder / "simrig", image, *([] if drive == "analog" else [drive]), *arguments))
+        return boards[-1]
+
+    yield start
+    for board in boards:
+        board.close()
+
+
+@pytest.fixture
+def pico(built: Callable[[str, str], Path]) -> Iterator[Start]:
+    """Starts the Pico's image on rp2040js."""
+    if reason := no_pico():
+        pytest.skip(reason)
+    folder, boards = built("pico", "arm-none-eabi-gcc"), []
+
+    def start(drive: str = "pair") -> Board:
+        boards.append(emulated(folder, drive))
         return boards[-1]
 
     yield start

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.boards import plant
+from benchmarks.boards import PicoLine, plant, rig_on
 from benchmarks.designs import GAIN, PARAMETERS
 from tests.firmware.test_pwm import STEPS, SUPPLY
 from tests.rigs import conformance
@@ -17,6 +17,7 @@ SLOW = [pytest.param(drive, marks=pytest.mark.slow) for drive in ("analog", "pai
 
 @pytest.fixture(params=["host", *SLOW])
 def specimen(request):
+    """Firmware on the host, and on the ATmega2560 in simavr."""
     start, boards = request.getfixturevalue("host" if request.param == "host" else "avr"), {}
     how, bridge = {}, request.param in ("pair", "sign")
     if request.param != "host":
@@ -32,6 +33,31 @@ def specimen(request):
         boards[rig].do(f"run {round(seconds / 1e-3)}")
 
     return conformance.Specimen(name=request.param, make=make, silence=silence)
+
+
+@pytest.fixture(params=["pair", "sign"])
+def on_a_pico(request, pico):
+    boards = {}
+
+    def make():
+        board = pico(request.param)
+        rig = rig_on(lambda: PicoLine(board), lockstep=True, full_scale=SUPPLY)
+        boards[rig] = board
+        return rig
+
+    def silence(rig, seconds):
+        boards[rig].do(f"run {round(seconds / 1e-3)}")
+
+    return conformance.Specimen(name=request.param, make=make, silence=silence)
+
+
+@pytest.mark.slow
+class TestPico(conformance.Conformance):
+    """All rules, on the Pico's own image in rp2040js."""
+
+    @pytest.fixture
+    def specimen(self, on_a_pico):
+        return on_a_pico
 
 
 class TestFirmware(conformance.Conformance):

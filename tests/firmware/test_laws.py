@@ -61,9 +61,9 @@ def told(host, law, q, references):
     return np.array(out[1:])  # a sample tells the command that was put out until then
 
 
-def in_float32(law, q, references, most):
+def in_float32(law, q, references, most, about=ABOUT):
     """The law written out, every product and sum rounded to float32, entries that are zero skipped."""
-    f, b = np.float32, onboard(law, ABOUT, PERIOD)
+    f, b = np.float32, onboard(law, about, PERIOD)
     z, out, u = None, [], 0
     limit = min(f(b.limit), f(most))
     with np.errstate(over="ignore"):

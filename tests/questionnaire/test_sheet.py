@@ -71,7 +71,10 @@ def test_ratings_lie_on_the_scale_and_may_be_missing(missing):
         ("5", (1, 5), True),
         ("0", (0, 3), True),
         ("1.0", (1, 4), True),
-        ("1.5", (1, 4), False),
+        ("2.5", (1, 4), True),  # between two of its marks
+        ("4.5", (1, 4), False),
+        ("62.5", (0, 100), True),
+        ("100.5", (0, 100), False),
     ],
 )
 def test_a_rating_off_the_scale_is_refused_by_line_and_column(cell, scale, good):
@@ -81,7 +84,7 @@ def test_a_rating_off_the_scale_is_refused_by_line_and_column(cell, scale, good)
         assert isinstance(found, Ratings)
         assert found.items[0].post[1] == float(cell)
     else:
-        with pytest.raises(BadInput, match=rf"line 3, 'a post': a whole rating from {scale[0]} to {scale[1]}"):
+        with pytest.raises(BadInput, match=rf"line 3, 'a post': a rating from {scale[0]} to {scale[1]}"):
             read_table(text, "a.csv", scale=scale)
 
 
@@ -127,7 +130,7 @@ def test_one_row_per_answer_is_sorted_by_person_and_question():
     [
         (LONG + "before,b,p,3\n", r"'b' rates 'p' \(pre\) in line 5 and again in line 6; keep one"),
         (LONG + "later,b,q,3\n", "line 6: pre or post was needed for the time, got 'later'"),
-        (LONG + "before,b,q,9\n", "line 6: a whole rating from 1 to 4 was needed, got 9"),
+        (LONG + "before,b,q,9\n", "line 6: a rating from 1 to 4 was needed, got 9"),
         ("phase,question,score\npre,p,1\n", "'a.csv': one row per answer needs a column that names the person"),
         ("id,a pre,a post\nx,1,2\n,1,2\n,2,2\nx,3,3\n", "'x' answers in line 2 and again in line 5"),
         ("a pre,b post\n1,2\n", "'a' has a column pre but none"),

@@ -18,6 +18,7 @@ from upright.questionnaire.statistics import (
     fitting,
     holm,
     signed_ranks,
+    squares_of_gains,
     whole_row,
 )
 
@@ -185,3 +186,18 @@ def test_a_bound_takes_two_people_and_means_on_the_scale(pre, post, n, scale, se
             bound(pre, post, n, scale=scale)
     else:
         assert bound(pre, post, n, scale=scale).answers == n
+
+
+def test_gains_of_equal_size_are_tied_whatever_their_decimals():
+    """Ratings of 3.3 and 2.3, both 0.2 lower before: two equal gains, whose ranks share 1.5."""
+    found = compare_ratings([3.1, 2.1, 2.0], [3.3, 2.3, 1.0])
+    up, down, _ = signed_ranks(np.array([0.2, 0.2, -1.0]))
+    assert found.signed_rank == min(up, down) == 3.0
+    assert found.ranks_effect == 0.0
+
+
+def test_the_extremes_on_a_scale_of_a_hundred_are_those_of_people_at_its_ends():
+    """20 people from 60 to 75 each, or 12 of 20 at 100 before and 15 after, of whom as many as can change sides."""
+    least, most = squares_of_gains(1200, 1500, 20, (0, 100))
+    assert least == 20 * 15**2
+    assert most == (5 + 8) * 100**2  # 12 at the top and 8 below; 15 and 5: 5 fall and 8 rise

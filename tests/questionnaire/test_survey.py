@@ -210,8 +210,8 @@ def test_encodings_and_declared_delimiters_of_excel_are_read(tmp_path, encoding)
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("id,a pre,a post\n1,2,5\n2,3,3\n", "line 2, 'a post': a whole rating from 1 to 4 was needed, got 5"),
-        ("id,a pre,a post\n1,2,2.5\n", "whole rating"),
+        ("id,a pre,a post\n1,2,5\n2,3,3\n", "line 2, 'a post': a rating from 1 to 4 was needed, got 5"),
+        ("id,a pre,a post\n1,2,4.5\n", "a rating from 1 to 4"),
         ("id,a pre,a post\n1,2,often\n", "got 'often'"),
         ("id,a pre,a post\n1,2,3\n1,2,3\n", "line 2 and again in line 3"),
         ("id,a pre\n1,2\n", "none for the other time"),

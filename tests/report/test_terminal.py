@@ -122,3 +122,33 @@ def test_a_chapter_survives_as_plain_values_symbols_and_numbers_included():
     assert again.numbers == {"a": [1, 2]}
     assert (again.title, again.steps, again.sound) == ("T", page.steps, True)
     assert Symbol("J_d [kg]").divided() == ("J_d", " [kg]")
+
+
+STATUSES = Table(
+    caption="Numbers", headings=("symbol", "value", "status", "name and meaning"), numbers=(1,),
+    rows=(("actuator.gain", "0.1609", "well determined (±6.4 %)", "force per unit of command"),),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("width", range(30, 101, 5))
+def test_a_table_breaks_no_word_however_narrow_the_terminal_is(width):
+    page = Chapter(title="T", verdict="", parts=(Part("One", (STATUSES,)),))
+    lines = printed(print_chapter, page, width=width)
+    words = " ".join(lines).split()
+    for cell in STATUSES.rows[0][:-1]:  # the last column is left out before the others suffer
+        assert all(word in words for word in cell.split()), lines
+    assert max(map(len, lines)) <= width
+
+
+def test_sentences_wrap_at_words_where_somebody_watches_and_commands_stay_whole():
+    stream = io.StringIO()
+    verdict = "A sentence of many words that a terminal of forty columns would break in the middle of one."
+    command = "upright identify a-study-with-a-long-name.toml -o a-folder-with-a-long-name"
+    page = Chapter(title="T", verdict=verdict, steps=(Step(verdict, command),))
+    print_chapter(Console(file=stream, width=40, force_terminal=True, color_system=None), page)
+    lines = stream.getvalue().splitlines()
+    assert f"    {command}" in lines
+    prose = [line for line in lines if command not in line]
+    assert max(map(len, prose)) <= 40
+    assert verdict in " ".join(" ".join(prose).split())
+    assert f"Verdict: {verdict}" in printed(print_chapter, page, width=40)  # piped: a line of its own

@@ -377,3 +377,11 @@ def test_what_contradicts_itself_is_refused(folder, tmp_path):
         run_rig(RunRequest(rig=folder / "RIG.toml", law=tmp_path / "law.json"), tmp_path)
     with pytest.raises(BadInput, match="sweep SIZE FROM TO"):
         run_rig(RunRequest(rig=folder / "RIG.toml", excite="sweep 1"), tmp_path)
+
+
+def test_a_start_beyond_the_window_of_a_run_is_refused_by_its_size(folder, tmp_path):
+    """A run that holds a pendulum upright begins within 10 degrees of it: a person holds no more still."""
+    late = RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=0.5, tilt=math.radians(12))
+    with pytest.raises(BadInput, match=r"begins within 10 deg of it, and --start is 12 deg"):
+        run_rig(late, tmp_path)
+    assert run_rig(replace(late, tilt=math.radians(9.9)), tmp_path).end.ticks > 0

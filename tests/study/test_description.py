@@ -163,6 +163,9 @@ def test_a_fit_of_older_form_tells_its_drive_from_its_parameters(cart, tmp_path)
         (('vendor = "ECP 210"', 'vendor = "ECP 201"'), "line 4: there is no data sheet of 'ECP 201'; did you mean"),
         (('converter = "2.4 mV"', 'converter = "2.4 mm"'), "Expected a value in V"),
         (('converter = "2.4 mV"', "converter = 0"), "converter must be above zero"),
+        (('converter = "2.4 mV"', "bits = 12"), "a converter has bits and range"),
+        (('converter = "2.4 mV"', 'converter = "2.4 mV"\nbits = 12\nrange = "10 V"'), "or its step alone"),
+        (('converter = "2.4 mV"', 'bits = 12.5\nrange = "10 V"'), "bits must be a whole number"),
         (("counts_per_m = 20000", "counts_per_m = { value = -4 }"), "counts_per_m must be above zero"),
         (("counts_per_m = 20000", "counts_per_m = { guess = 4 }"), "has no key 'guess'"),
         (("measured = true }\nforce", "measured = true, assumed = true }\nforce"), "assumed or measured, not both"),
@@ -240,3 +243,17 @@ def test_only_a_log_that_is_an_ecp_s_is_given_its_data_sheet(tmp_path, log):
     text = draft(record, inspect(record), tmp_path / "ecp.txt", tmp_path / "s.toml", plant="rectilinear-2")
     assert 'vendor = "ECP 210"' in text
     assert "servo_period" not in text  # its export leaves samples out
+
+
+@pytest.mark.parametrize(
+    ("bits", "span", "step"),
+    # from -10 to 10 V in 4096 steps, and from -5 to 5 V in 65,536, as data sheets have them
+    [
+        (12, '"10 V"', 4.8828125e-3), (16, '"5 V"', 152.587890625e-6),
+        (12, '{ value = "10 V", measured = true }', 20 / 4096),
+    ],
+)  # fmt: skip
+def test_a_converter_of_bits_over_a_range_has_this_step(cart, bits, span, step):
+    rig = load_study(cart(CART.replace('converter = "2.4 mV"', f"bits = {bits}\nrange = {span}"))).rig
+    assert rig.converter == step
+    assert rig.hardware.entries["converter"].source == ("measured" if "measured" in span else "known")

@@ -88,3 +88,21 @@ def test_a_tilt_and_a_push_are_read_for_one_version_more():
     with pytest.deprecated_call(match="say start="):
         former = up.chance(RIG, K, tilt=0.1, push=0.4, draws=4)
     assert former.run.u.tolist() == now.run.u.tolist()
+
+
+@pytest.mark.parametrize(
+    "counts", [(20000, 4096), [20000, 4096], "20000, 4096", "psi=20000, theta=4096", {"psi": 20000, "theta": 4096}]
+)
+def test_counts_of_each_coordinate_are_said_again_as_a_command_reads_them(counts):
+    from upright.verbs.options import as_typed, rig_entries
+
+    typed = as_typed({"counts": counts}).removeprefix(' --counts "').removesuffix('"')
+    for said in (counts, typed):
+        entries = rig_entries(ARM, "V", {"counts": said})
+        assert {n: e.value for n, e in entries.items()} == {"counts.psi": 20000, "counts.theta": 4096}
+
+
+@pytest.mark.parametrize("counts", ["1, 2, 3", (1, 2, 3), "1, 2, theta=4096"])
+def test_counts_that_do_not_fit_the_coordinates_are_refused(counts):
+    with pytest.raises(up.BadInput, match="one number for all coordinates, one for each of psi, theta"):
+        up.design(RIG, poles=[-4 + 2j, -4 - 2j, -17, -3], counts=counts)

@@ -71,24 +71,40 @@ def view(*, quiet: bool) -> Generator[Callable[[RunState], str]]:
 
 
 def lines(state: RunState, largest: float) -> Any:
-    """What is shown of a run: phase, deviations, command as a bar, late ticks, faults, the key that stops it."""
+    """What is shown of a run: phase, time left, deviations, command as a bar, late ticks, faults, the key to stop.
+
+    The bar is full at the limit, or at the `largest` command so far where the limit is not known.
+    """
     from rich.text import Text
 
     from upright.rigs.board import fault_text
 
     if state.phase != "running":
         return Text.assemble((f"{state.phase[:1].upper()}{state.phase[1:]}", "bold"), "\nspace, q or Esc: stop")
-    bar = effort_bar(state.applied, largest)
-    away = "  ".join(f"{q:+9.4f}" for q in state.readings)
+    scene = state.scene
+    limited = math.isfinite(scene.limit)
+    bar = effort_bar(state.applied, scene.limit if limited else largest)
+    names = scene.readings if len(scene.readings) == len(state.readings) else (("", ""),) * len(state.readings)
+    away = "  ".join(_deviation(*named, q) for named, q in zip(names, state.readings, strict=True))
+    left = f", {max(scene.seconds - state.time, 0.0):.1f} s left" if math.isfinite(scene.seconds) else ""
+    of_limit = f" of {scene.limit:g}" if limited else ""
+    unit = f" {scene.command_unit}" if scene.command_unit else ""
     late = (f"{state.late} late", "bold red" if state.late else "green")
     out = Text.assemble(
-        (f"{state.time:8.2f} s  {state.mode.name}", "bold"), f"  tick {state.tick}  ", late, "\n",
-        f"away {away}\n", f"command {state.applied:+8.3f} {bar}\n",
+        (f"{state.time:8.2f} s{left}  {state.mode.name}", "bold"), f"  tick {state.tick}  ", late, "\n",
+        f"away {away}\n", f"command {state.applied:+8.3f}{of_limit}{unit} {bar}\n",
     )  # fmt: skip
     if state.faults:
         out.append(f"{fault_text(state.faults)}\n", style="bold red")
     out.append("space, q or Esc: stop", style="dim")
     return out
+
+
+def _deviation(name: str, unit: str, value: float) -> str:
+    """One deviation with its name, angles in degrees."""
+    if unit == "rad":
+        return f"{name} {math.degrees(value):+8.2f} deg"
+    return f"{name} {value:+9.4f} {unit}".strip(" ") if name else f"{value:+9.4f}"
 
 
 def effort_bar(value: float, largest: float) -> str:

@@ -101,8 +101,8 @@ class Preflight:
         """The 95 % interval of the share, by Wilson, from how many rigs were simulated."""
         from scipy.stats import binomtest
 
-        found = binomtest(int(np.sum(self.drawn.held)), self.drawn.held.size).proportion_ci(method="wilson")
-        return float(found.low), float(found.high)
+        ends = binomtest(int(np.sum(self.drawn.held)), self.drawn.held.size).proportion_ci(method="wilson")
+        return float(ends.low), float(ends.high)
 
     @property
     def chance(self) -> float:

@@ -58,9 +58,9 @@ BOUNDS = {
     ("other", 2.0): 5.5, ("other", 4.0): 7.0, ("drive", 0.25): 4.6, ("drive", 0.5): 4.6,
 }  # fmt: skip
 """Logarithms of the odds at which a suspicion is believed: those that a Gumbel distribution of the largest in 50 s,
-fitted to 0.8 hours of each of two makes, worn, tapped and pushed, passes once in some 300 hours; at least ln 100. A
-hand at the pendulum that a law answers looks as if theta showed too little, or the body too much: hence the four high
-ones. `python -m benchmarks false_stops` is 10 hours of other rigs."""
+fitted to 0.8 hours of each of two rig models, non-ideal, tapped and pushed, passes once in some 300 hours; at least ln
+100. A hand at the pendulum that a law answers looks as if theta showed too little, or the body too much: hence the four
+high ones. `python -m benchmarks false_stops` is 10 hours of other rigs."""
 LEADS = 4.0
 """Logarithm of the odds by which the best suspicion leads the next when it is named."""
 PATIENCE = 0.3
@@ -145,8 +145,8 @@ def watched(
         return trial(rig, law, at=watch.at, start=start, seconds=seconds, rest=rest, off=off)
 
     free = run(math.inf)
-    seen = np.column_stack([free.record[c.name] for c in rig.plant.coordinates]) - free.rest
-    alarm = watch.over(seen, free.u)
+    readings = np.column_stack([free.record[c.name] for c in rig.plant.coordinates]) - free.rest
+    alarm = watch.over(readings, free.u)
     k = int(alarm.sample[0])
     return (free if k < 0 else run((k + 1) * rig.period)), alarm
 
@@ -173,13 +173,13 @@ class Watch:
         self.model, self.at = model, at
         self._body = names.index(model.plant.inputs[0].on)
         self._other = 1 - self._body
-        said = [("body", names[self._body], f) for f in FACTORS] + [("other", names[self._other], f) for f in FACTORS]
-        said += [("drive", "the drive", f) for f in STRENGTHS]
+        kinds = [("body", names[self._body], f) for f in FACTORS] + [("other", names[self._other], f) for f in FACTORS]
+        kinds += [("drive", "the drive", f) for f in STRENGTHS]
         slips = Suspicion(name=names[self._other], factor=1.0)
-        self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for _, n, f in said), slips)
-        self._factor = {kind: np.array([[f if k == kind else 1.0] for k, _, f in said]) for kind in
+        self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for _, n, f in kinds), slips)
+        self._factor = {kind: np.array([[f if k == kind else 1.0] for k, _, f in kinds]) for kind in
                         ("body", "other", "drive")}  # fmt: skip
-        self._bounds = np.array([[BOUNDS[kind, f]] for kind, _, f in said])
+        self._bounds = np.array([[BOUNDS[kind, f]] for kind, _, f in kinds])
         A, B = model.linear(at).A, model.linear(at).B[:, 0]
         body, other = 2 * self._body + 1, 2 * self._other + 1
         self._drive, self._rho = float(B[body]), float(B[body] / B[other])
@@ -190,7 +190,7 @@ class Watch:
         self._late = 1 + round((model.delay + model.lag) / T)
         self._pass, self._look = CORNER * T, max(1, round(_EVERY / T))
         step = self._look * T
-        self._slow, self._kept = SLOWEST * step, math.exp(-step / MEMORY)
+        self._slow, self._memory = SLOWEST * step, math.exp(-step / MEMORY)
         self._weight, self._step = CORNER * step / 2, step  # independent samples in a look
         self._friction = held_by(model, at)
         rounding = 0.3 * CORNER**2 * model.resolution
@@ -246,7 +246,7 @@ class Watch:
         self._lean((parts[2] + parts[3] - parts[0] - parts[1]) / self._kappa)
         self._mean += self._slow * (parts - self._mean)
         costs = self._costs(parts - self._mean)
-        self.odds *= self._kept
+        self.odds *= self._memory
         self.odds += self._weight * (costs[0] - costs[1:])
         lean = np.abs(place[1])
         ranked = np.sort(self.odds, axis=0)
@@ -312,8 +312,8 @@ class Watch:
         self._begin(lanes)
         for k in range(len(y)):
             odds[k] = self.see(y[k].T, u[k])
-            said, best = self.speaks()
-            now = (sample < 0) & said
+            alarm_raised, best = self.speaks()
+            now = (sample < 0) & alarm_raised
             sample[now], which[now] = k, best[now]
         return Alarm(sample=sample, what=tuple(self.suspicions[i] for i in which.tolist()), odds=odds)
 

@@ -103,7 +103,7 @@ def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[st
     if isinstance(motion, str):
         return [], dict.fromkeys(("sign", "scale", "trip"), motion)
     blamed = {f.columns for f in findings if f.kind == "effort" and f.severity != "note"}
-    lying = (case.drive,) in blamed and not _in_dac(case)
+    faulty = (case.drive,) in blamed and not _in_dac(case)
     numbers = values_of(case, friction_of(case.plant))
     out: list[Finding] = []
     reasons: dict[str, str] = {}
@@ -112,8 +112,8 @@ def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[st
         reasons["scale"] = numbers
     else:
         balance = ForceBalance(motion, *numbers)
-        balance.used = balance.used and not lying
-    push = None if lying else push_of(motion, balance)
+        balance.used = balance.used and not faulty
+    push = None if faulty else push_of(motion, balance)
     conventions = against_numbers(case, balance) if balance is not None else []
     trip = examine_push(case, push, most=0.35 if balance is None else 0.15) if push is not None else []
     if conventions and trip and push is not None and 100 * push.cut > min(f.left for f in conventions):
@@ -122,7 +122,7 @@ def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[st
         motion = replace(motion, u=np.where(motion.t < push.end, motion.u, 0.0))
         conventions = against_numbers(case, ForceBalance(motion, *numbers)) if not isinstance(numbers, str) else []
     if balance is None:
-        signed = [x for x in terms(motion) if not (lying and x.who[0] == "effort")]
+        signed = [x for x in terms(motion) if not (faulty and x.who[0] == "effort")]
         conventions = against_form(case, motion, signed)
         if not signed:
             reasons["sign"] = "the record holds no motion whose sign is known"
@@ -133,7 +133,7 @@ def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[st
     if not out and not rough and push is not None:
         out += examine_uselessness(case, push)
     if push is None and case.driven:
-        reasons["trip"] = "the effort column is none" if lying else "the driven body was not measured or did not move"
+        reasons["trip"] = "the effort column is none" if faulty else "the driven body was not measured or did not move"
     return out, reasons
 
 

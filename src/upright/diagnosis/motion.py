@@ -64,7 +64,7 @@ def motion_of(case: Case) -> SmoothedMotion | str:
     coordinates = [c.name for c in case.plant.coordinates]
     missing = [c for c in coordinates if c not in case.places and c not in case.locked]
     if case.chained and case.rig is None and case.places:
-        missing = []  # a body without a column was held, or is at least not told of
+        missing = []  # a body without a column was held, or is at least not mentioned
     if missing:
         return f"no column measures {', '.join(missing)}"
     steps = np.diff(case.record.t)

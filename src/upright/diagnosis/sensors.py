@@ -199,8 +199,8 @@ def clipped(x: Array, resolution: float, *, inertia: bool) -> tuple[float, float
         if not long.any():
             continue
         first, after = first[long], after[long]
-        came, left = _abrupt(x, first, -1, resolution), _abrupt(x, after - 1, 1, resolution)
-        hard = came & left if inertia else came | left
+        entered, left = _abrupt(x, first, -1, resolution), _abrupt(x, after - 1, 1, resolution)
+        hard = entered & left if inertia else entered | left
         if hard.any():
             ends[k] = level
             share += float((after - first)[hard].sum()) / x.size

@@ -34,7 +34,7 @@ from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
-from upright.identification.problem.trips import unasked_trips, with_trip_guesses
+from upright.identification.problem.trips import Moments, unasked_trips, with_trip_guesses
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
 from upright.identification.search.strategy import (
     ATTEMPTS,
@@ -105,15 +105,16 @@ def identify(
 
 def _identify(
     rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
-    conventions: Callable[[], Sequence[str]] | None = None,
+    conventions: Callable[[], Sequence[str]] | None = None, moments: Moments | None = None,
 ) -> Fit:  # fmt: skip
-    """As `identify`; a fit without outliers knows the `conventions` of all samples."""
+    """As `identify`; a fit without outliers knows `conventions` and `moments` of all samples."""
     began = time.perf_counter()
     rig = with_noise(rig, runs)
-    fitted = [with_trip_guesses(rig, run) for run in runs if run.role == "fit"]
+    moments = moments or Moments(rig)
+    fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
     log = SearchLog(progress=progress, conventions=conventions or cache(lambda: wrong_conventions(rig, fitted)))
-    log.warnings += unasked_trips(rig, fitted)
+    log.warnings += unasked_trips(rig, fitted, moments)
     try:
         problem, optimum = find_optimum(rig, fitted, method, log, near)
     except KeyboardInterrupt:
@@ -137,7 +138,9 @@ def _identify(
             return fit
         fit = refit_without_outliers(
             fit, rig, runs,
-            lambda left: _identify(rig, left, method, progress, watch=False, near=fit, conventions=log.conventions),
+            lambda left: _identify(
+                rig, left, method, progress, watch=False, near=fit, conventions=log.conventions, moments=moments
+            ),
         )  # fmt: skip
         explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
         return fit if explained or log.conventions() else with_proposal(fit, fitted)
@@ -342,10 +345,10 @@ def _scores(
     scores = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
-    foreseen = [r for r in runs if r.role != "fit"]
+    others = [r for r in runs if r.role != "fit"]
     pace = min(t.period for t in problem.tracks)
-    for label, predicted in predict(values, rig, foreseen, groups=known, bands=bands, progress=log.progress).items():
-        held_out = next(run for run in foreseen if run.label == label)
+    for label, predicted in predict(values, rig, others, groups=known, bands=bands, progress=log.progress).items():
+        held_out = next(run for run in others if run.label == label)
         scores[label] = replace(predicted, black_box=black_box(fitted, held_out, pace))
     return {run.label: scores[run.label] for run in runs}
 

@@ -330,6 +330,7 @@
   };
   window.upright = { twin, act, frames: 0, answered: [], answer };
   document.documentElement.classList.add("alive");
+  if (parent !== window) document.documentElement.classList.add("framed");
   drawPoles();
   draw();
   answer();

@@ -96,7 +96,7 @@ def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lan
         "settled": BAND,
         "felt": FELT,
         "moved": moved,
-        "outline": in_javascript(plant),
+        "outline": in_javascript(partial(plant.outline, plant), len(coordinates)),
         "A": model.A.tolist(),
         "B": model.B[:, 0].tolist(),
         "K": loop.K[0].tolist(),

@@ -69,15 +69,15 @@ class _Disk(threading.Thread):
 
     def __init__(self, output: _Output) -> None:
         super().__init__(daemon=True)
-        self._output, self._asked = output, threading.Event()
+        self._output, self._requested = output, threading.Event()
         self.start()
 
     def ask(self) -> None:
-        self._asked.set()
+        self._requested.set()
 
     def run(self) -> None:
-        while self._asked.wait():
-            self._asked.clear()
+        while self._requested.wait():
+            self._requested.clear()
             self._output.sync()
 
 

@@ -171,19 +171,19 @@ def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> A
     verdict, content = process.stdout[:1], process.stdout[1:]
     if verdict == _REFUSED:
         raise BadInput(content.decode())
-    if verdict != _GIVEN or len(content) != 8 * rows:
+    if verdict != _COMMANDS or len(content) != 8 * rows:
         raise BadInput(f"the rule of '{file}' ended the process that it ran in, so that there is nothing to compare.")
     return np.frombuffer(content, dtype=np.float64)
 
 
-_GIVEN, _REFUSED = b"=", b"!"
+_COMMANDS, _REFUSED = b"=", b"!"
 
 
 def answer() -> None:
     """In the process of a logged rule: its commands, or why there are none, for what comes in."""
     law, stretches, file = pickle.load(sys.stdin.buffer)
     try:
-        content = _GIVEN + _commands(of_values(law), stretches, file).tobytes()
+        content = _COMMANDS + _commands(of_values(law), stretches, file).tobytes()
     except BadInput as refusal:
         content = _REFUSED + str(refusal).encode()
     sys.stdout.buffer.write(content)

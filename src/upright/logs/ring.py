@@ -146,7 +146,7 @@ def _nameless(size: int, folder: str | None) -> int:
     file, path = tempfile.mkstemp(prefix="upright-log-", dir=folder)
     Path(path).unlink()
     try:
-        if os.write(file, bytes(size)) == size:  # written, so that a full disk is told here, not by a signal later
+        if os.write(file, bytes(size)) == size:  # written, so that a full disk is reported here, not by a signal later
             return file
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     except OSError:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any
 
 Point = tuple[Any, Any, Any]
 Outline = list[tuple[str, list[Point]]]
@@ -35,28 +35,18 @@ def circle(radius: Any, z: float) -> list[Point]:
     return [(radius * math.cos(a), radius * math.sin(a), z) for a in turns]
 
 
-class Drawn(Protocol):
-    """What a plant says of how it is drawn."""
-
-    coordinates: Sequence[Any]
-
-    def outline(self, p: Any, q: Any) -> Outline:
-        """Its lines."""
-        ...
-
-
-def in_javascript(plant: Drawn) -> str:
+def in_javascript(outline: Callable[[Sequence[Any]], Outline], coordinates: int) -> str:
     """JavaScript of ``(q) => [[coordinate, [[x, y, z], ...]], ...]``, lines of the rig [m]; empty where it has none."""
     from sympy import Symbol
 
-    symbols = [Symbol(f"q{i}") for i in range(len(plant.coordinates))]
-    lines = plant.outline(plant, symbols)
+    symbols = [Symbol(f"q{i}") for i in range(coordinates)]
+    lines = outline(symbols)
     if not lines:
         return ""
     line = '["{}", [{}]]'
     body = ", ".join(line.format(name, ", ".join(_point(p) for p in points)) for name, points in lines)
-    given = "; ".join(f"const q{i} = q[{i}]" for i in range(len(symbols)))
-    return f"(q) => {{ {given}; return [{body}]; }}"
+    constants = "; ".join(f"const q{i} = q[{i}]" for i in range(len(symbols)))
+    return f"(q) => {{ {constants}; return [{body}]; }}"
 
 
 def _point(point: Sequence[Any]) -> str:

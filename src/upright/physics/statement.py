@@ -171,7 +171,7 @@ class Statement:
     def equilibrium(self, at: str | None = None) -> dict[str, float]:
         """Coordinates [rad or m] of a named equilibrium, every coordinate listed."""
         at = next(iter(self.equilibria)) if at is None else at
-        if at not in self.equilibria:
+        if not isinstance(at, str) or at not in self.equilibria:  # type: ignore[reportUnnecessaryIsInstance]
             raise BadInput(f"{type(self).__name__} has no equilibrium '{at}'; {nearest(at, self.equilibria)}")
         return {c.name: float(self.equilibria[at].get(c.name, 0.0)) for c in self.coordinates}
 

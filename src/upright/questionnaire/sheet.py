@@ -129,9 +129,9 @@ def _rating(cell: str, scale: tuple[int, int], where: str) -> float:
         value = float(cell)
     except ValueError:
         raise BadInput(f"{where}: a rating from {low} to {high} was needed, got '{cell[:40]}'.") from None
-    if not low <= value <= high or value != round(value):
+    if not low <= value <= high:
         raise BadInput(
-            f"{where}: a whole rating from {low} to {high} was needed, got {cell}; correct it, leave it empty, or say"
+            f"{where}: a rating from {low} to {high} was needed, got {cell}; correct it, leave it empty, or give"
             " --scale."
         )
     return value

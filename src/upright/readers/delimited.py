@@ -17,6 +17,7 @@ from upright.readers.source import Source, TextTable
 from upright.records import Array, Record
 from upright.records.columns import stated_time_unit, stated_unit, time_scale
 from upright.records.record import CSV_MARK
+from upright.units import converted
 
 _FIRST = 200  # lines that names and remarks may take
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
@@ -97,7 +98,7 @@ def read(source: Source) -> Record:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
     elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
         notes.append(f"No column is named like a time; '{text.names[at]}' is the first and increases.")
-    t = table[:, at] * seconds
+    t = converted(table[:, at], seconds)
     if is_epoch(t) and seconds == 1:
         rows = [line for line in text.body.split("\n") if line.strip()]
         cells = [row.split(text.delimiter)[at] for row in rows]

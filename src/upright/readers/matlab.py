@@ -31,6 +31,7 @@ from upright.readers.source import Source
 from upright.records import Array, Record
 from upright.records.columns import time_scale
 from upright.records.record import KEY
+from upright.units import converted
 
 Variables = dict[str, Any]
 """By name: arrays (as many axes as in MATLAB), text, dict for a structure, list for cells, `Unreadable`."""
@@ -271,7 +272,7 @@ def _vectors(source: Source, content: Variables) -> Signals | None:
     clock = next((name for name in arrays if time_scale(name) and _is_vector(arrays[name])), "")
     notes: list[str] = []
     if clock:
-        t = arrays.pop(clock).ravel() * time_scale(clock)
+        t = converted(arrays.pop(clock).ravel(), time_scale(clock))
     else:
         step = next((name for name in content if name.casefold() in _STEP_NAMES and _scalar(content[name]) > 0), "")
         lengths = [value.size for value in arrays.values() if _is_vector(value)]

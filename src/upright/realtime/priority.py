@@ -94,7 +94,7 @@ def step_forward(*, fifo: bool = True) -> LoopPriority:
 
 def _stay_awake() -> bool:
     try:
-        held = os.open(_WAKE_LATENCY, os.O_WRONLY)  # never closed: the wish ends with the process
+        held = os.open(_WAKE_LATENCY, os.O_WRONLY)  # never closed: the request ends with the process
         os.write(held, (0).to_bytes(4, sys.byteorder))
     except OSError:
         return False

@@ -45,12 +45,12 @@ class _Window:
         )  # fmt: skip
         m[_FIELDS] = len(state.readings)
         m[_FIELDS + 1 : _FIELDS + 1 + len(state.readings)] = state.readings[:_READINGS]
-        if state.phase != self._said:
-            self._said = state.phase
+        if state.phase != self._last:
+            self._last = state.phase
             self._phase.value = state.phase.encode()[:200]
         m[0] += 1
 
-    _said = ""
+    _last = ""
 
     def get(self) -> RunState:
         while True:
@@ -135,7 +135,7 @@ def run_in_process(
 
 
 def _last(pipe: Connection) -> Any:
-    """The child's answer once it was told to stop; None when it dies without one."""
+    """The child's answer after a request to stop; None when it dies without one."""
     try:
         return pipe.recv() if pipe.poll(10.0) else None
     except EOFError:

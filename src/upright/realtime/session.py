@@ -77,6 +77,19 @@ class RunOrder:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RunScene:
+    """What stays the same while a run goes on: name and unit of each reading, the command's unit and limit, length [s].
+
+    A limit or length that is not known is infinite.
+    """
+
+    readings: tuple[tuple[str, str], ...] = ()
+    command_unit: str = ""
+    limit: float = math.inf
+    seconds: float = math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
 class RunState:
     """How a run goes; time and ticks since its loop began, ``readings`` as deviations from what is held."""
 
@@ -89,6 +102,7 @@ class RunState:
     command: float = 0.0
     applied: float = 0.0
     readings: tuple[float, ...] = ()
+    scene: RunScene = RunScene()
 
 
 @dataclass(frozen=True, kw_only=True)

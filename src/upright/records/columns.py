@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
+from upright.units import converted
 
 TIME_NAMES = (
     *("t", "time", "t_received", "timestamp", "__time", "tout", "time_s", "t_s", "seconds", "sec"),
@@ -102,4 +103,4 @@ def _seconds(values: Any, unit: float) -> NDArray[np.float64]:
         array = array - array[:1]
     if array.dtype.kind == "m":
         return array / np.timedelta64(1, "s")
-    return array * unit if array.dtype.kind in "iuf" else array
+    return converted(array, unit) if array.dtype.kind in "iuf" else array

@@ -118,7 +118,22 @@ class Picture:
         return svg(self.draw(), self.name)
 
 
-Block = str | Points | Facts | Code | Formula | Table | Picture
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Live:
+    """A page of its own that moves, framed in a report on a screen; paper, terminals and stored pages leave it out.
+
+    Attributes
+    ----------
+    markup : str
+        The page.
+    description : str
+    """
+
+    markup: str
+    description: str
+
+
+Block = str | Points | Facts | Code | Formula | Table | Picture | Live
 """What stands in a part, in its order; a plain text is a paragraph, which a terminal leaves to the page."""
 
 
@@ -323,7 +338,9 @@ def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> 
     if is_dataclass(value):
         content = {f.name: as_plain(getattr(value, f.name), instead) for f in fields(value)}
         return {"kind": type(value).__name__, **content}
-    return [as_plain(v, instead) for v in value] if isinstance(value, tuple | list) else value
+    if isinstance(value, tuple | list):
+        return [as_plain(v, instead) for v in value if not isinstance(v, Live)]
+    return value
 
 
 def from_plain(content: Any) -> Any:

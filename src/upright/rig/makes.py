@@ -170,9 +170,9 @@ class Make:
 
 def _rig(name: str, rig: Mapping[str, Any], plant: Mapping[str, Any], **more: float) -> Rig:
     """A rig as designed, in the words of `Rig.known`; what every ECP has alike is not in its file."""
-    given = {n: v for n, v in plant.items() if n != "kind"}
+    numbers = {n: v for n, v in plant.items() if n != "kind"}
     kind: Any = find(plant["kind"])
-    built = kind(**given, **{n: v for n, v in more.items() if n in kind.names()})
+    built = kind(**numbers, **{n: v for n, v in more.items() if n in kind.names()})
     return Rig.known(built, name=name, converter=CONVERTER, delay=SERVO, lag=LAG, period=SERVO, **rig)
 
 
@@ -198,7 +198,7 @@ def _body(key: Any, table: Mapping[str, Any]) -> BodyOnSpring:
 
 
 def _make(key: str, content: Mapping[str, Any]) -> Make:
-    asked, w = content["frequency"], content["weighing"]
+    response, w = content["frequency"], content["weighing"]
     pendulum = BrassPendulum(**_si(content["pendulum"])) if "pendulum" in content else None
     known = pendulum.parameters() if pendulum else {}
     later: dict[str, Any] = {"pulse": 0.0, "push": 0.0, "anchor": 0.0, "start": (0.0, 0.0)}
@@ -211,8 +211,9 @@ def _make(key: str, content: Mapping[str, Any]) -> Make:
             pieces=w["pieces"], each=_piece(w), rest=_si(w.get("rest", 0.0)), rest_error=_si(w.get("rest_error", 0.0)),
             bare=w["bare"], later=w["later"],
         ),
-        band=_si(asked["band"]), reach=_si(asked["reach"]), fastest=_si(asked.get("fastest", [math.inf, math.inf])),
-        bench=_si(asked["bench"]), sought=tuple(asked["sought"]), **later,
+        band=_si(response["band"]), reach=_si(response["reach"]),
+        fastest=_si(response.get("fastest", [math.inf, math.inf])),
+        bench=_si(response["bench"]), sought=tuple(response["sought"]), **later,
     )  # fmt: skip
 
 

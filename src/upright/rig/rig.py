@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -109,8 +110,10 @@ class Rig(Shown):
         >>> rig.limit, rig.period, round(rig.travel, 4)
         (10.0, 0.002, 2.0944)
         """
+        if not isinstance(plant, Plant):  # type: ignore[reportUnnecessaryIsInstance]
+            raise BadInput(f"a rig has a plant with numbers, such as up.Pendulum(m_p=...), got {plant!r:.40}.")
         force = plant.inputs[0].unit if plant.inputs else ""
-        strength = in_unit(gain, f"({force})/({unit})") if isinstance(gain, str) else gain
+        strength = in_unit(gain, f"({force})/({unit})")
         called = name or name_of(type(plant)) or type(plant).__name__
         return cls(plant=plant, name=called, gain=strength, unit=unit).replace(**numbers)
 
@@ -121,9 +124,9 @@ class Rig(Shown):
         ----------
         **changes
             Attributes; or numbers of the hardware, with their unit in text (``"2 ms"``) or SI and in the command's
-            unit: ``limit``, ``converter``, ``delay``, ``lag``, ``offset``, ``period``, ``travel``, ``speed_limit``,
-            ``twist``, of which an infinite one is none; ``counts`` of the encoders per turn or metre, one number for
-            all or one for each coordinate; and ``more``.
+            unit, as the gain: ``limit``, ``converter``, ``delay``, ``lag``, ``offset``, ``period``, ``travel``,
+            ``speed_limit``, ``twist``, of which an infinite one is none; ``counts`` of the encoders per turn or metre,
+            one number for all or one for each coordinate; and ``more``.
 
         Raises
         ------
@@ -136,7 +139,12 @@ class Rig(Shown):
             names = [*_ENTRIES, "counts", *attributes]
             raise BadInput(f"a rig has no '{unknown[0]}'; {nearest(unknown[0], names)}")
         plant: Plant = changes.get("plant", self.plant)
+        if not isinstance(plant, Plant):  # type: ignore[reportUnnecessaryIsInstance]
+            raise BadInput(f"a rig has a plant with numbers, such as up.Pendulum(m_p=...), got {plant!r:.40}.")
         place, unit = driven_unit(type(plant)), changes.get("unit", self.unit)
+        if "gain" in changes:
+            force = plant.inputs[0].unit if plant.inputs else ""
+            changes["gain"] = in_unit(changes["gain"], f"({force})/({unit})")
         units = {
             "limit": unit, "converter": unit, "offset": unit, "delay": "s", "lag": "s", "period": "s",
             "travel": place, "speed_limit": f"{place}/s", "twist": place,
@@ -307,8 +315,8 @@ class Rig(Shown):
 
 def _counts(plant: Plant, counts: float | Sequence[float]) -> dict[str, Entry]:
     n = len(plant.coordinates)
-    each = (counts,) * n if isinstance(counts, int | float) else tuple(counts)
-    if len(each) != n or any(not c > 0 for c in each):
+    each: tuple[Any, ...] = tuple(counts) if isinstance(counts, Sequence | np.ndarray) else (counts,) * n
+    if len(each) != n or any(not isinstance(c, Real) or not 0 < float(c) < math.inf for c in each):
         raise BadInput(f"a rig with {n} coordinates needs {n} positive numbers of counts, got {each}.")
     return {
         f"counts.{c.name}": Entry(value=float(per), unit=counts_unit(c.unit), source="known")

@@ -1,4 +1,4 @@
-"""What the supervisor is told while a pendulum is held: which of encoders and drive is likely not what it was."""
+"""Warnings to the supervisor while a pendulum is stabilised: which of encoders and drive is likely not what it was."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ class Doubts:
     @property
     def likeliest(self) -> str:
         """What may be wrong when something else stopped the rig, as a sentence behind others; "" when nothing is."""
-        found = self._watch.likely()
-        return f" {self._named(found)[0].upper()}{self._named(found)[1:]}" if found else ""
+        likely = self._watch.likely()
+        return f" {self._named(likely)[0].upper()}{self._named(likely)[1:]}" if likely else ""
 
-    def _named(self, found: tuple[Suspicion, ...]) -> str:
-        if not found:
+    def _named(self, likely: tuple[Suspicion, ...]) -> str:
+        if not likely:
             return "not sure why. Look at supply, cables and encoders (upright rig doctor)."
-        first, *others = found
-        which = f"likeliest is {first}" if not others else f"not sure why: {' or '.join(map(str, found))}"
+        first, *others = likely
+        which = f"likeliest is {first}" if not others else f"not sure why: {' or '.join(map(str, likely))}"
         return f"{which}. {first.advice}; if a hand pushed it, start again."

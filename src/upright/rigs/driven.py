@@ -1,4 +1,4 @@
-"""Must an encoder that shows not a single count have moved? Friction, which holds, is told from a counter that died.
+"""Must an encoder that shows not a single count have moved? Distinguishes friction from a dead counter.
 
 The driven body stands still where its command is within friction, for as long as it likes; beyond `HELD_BY` times the
 friction that the model knows of, it moves. The pendulum on it stands still, to a count, only while what carries it is
@@ -60,7 +60,7 @@ class StillPendulum:
         self._rho, self._period = float(B[self._body] / B[self.which]), model.period
         self._least = max(SWUNG, LEAST_SWUNG / model.per_unit[self.which])
         self._shown, self._behind = math.nan, math.nan
-        self._from, self._speed, self._for, self._seen = 0.0, 0.0, 0.0, 0.0
+        self._from, self._speed, self._for, self._seconds = 0.0, 0.0, 0.0, 0.0
 
     def sees(self, away: Sequence[float]) -> bool:
         """Take a sample as deviations; whether the pendulum must have moved since its last count."""
@@ -68,8 +68,8 @@ class StillPendulum:
         self._behind = body if math.isnan(self._behind) else self._behind
         speed = _SPEED * (body - self._behind)
         self._behind += speed * self._period
-        self._seen += self._period
-        if shown != self._shown or self._for > WITHIN or self._seen < 6 / _SPEED:
+        self._seconds += self._period
+        if shown != self._shown or self._for > WITHIN or self._seconds < 6 / _SPEED:
             self._shown, self._from, self._speed, self._for = shown, self._behind, speed, 0.0
         self._for += self._period
         off = self._behind - self._from - self._speed * self._for

@@ -6,6 +6,7 @@ import math
 import secrets
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NoReturn
 
 from upright.errors import BadInput, RigStopped
@@ -44,8 +45,8 @@ class SerialRig:
 
     Parameters
     ----------
-    line : str or Line
-        Port such as ``/dev/ttyACM0``, ``COM4`` or ``/dev/pts/4``.
+    line : str, Line or callable
+        Port such as ``/dev/ttyACM0``, ``COM4`` or ``/dev/pts/4``; or what opens a line.
     coordinates : sequence of str
         What each encoder measures, in the plant's order; one or two.
     counts : sequence of float
@@ -72,7 +73,7 @@ class SerialRig:
 
     def __init__(
         self,
-        line: str | Line,
+        line: str | Line | Callable[[], Line],
         *,
         coordinates: Sequence[str],
         counts: Sequence[float],
@@ -92,7 +93,8 @@ class SerialRig:
             )
         if not all(math.isfinite(n) and n != 0.0 for n in counts) or not 0.0 < full_scale < math.inf:
             raise BadInput(f"counts must not be zero and the full scale above it, got {counts} and {full_scale:g}.")
-        self._given, self._line = line, None if isinstance(line, str) else line
+        self._open = line if callable(line) else partial(open_line, line) if isinstance(line, str) else None
+        self._line = None if isinstance(line, str) or callable(line) else line
         self._coordinates, self._counts = tuple(coordinates), tuple(float(n) for n in counts)
         self._unit, self._full_scale, self._period = command_unit, full_scale, period
         self._patience, self._lockstep, self._resend, self._clock = patience, lockstep, resend, clock
@@ -119,9 +121,9 @@ class SerialRig:
     def open(self) -> Capabilities:
         """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
         if self._line is None:
-            if not isinstance(self._given, str):
+            if self._open is None:
                 raise RigStopped("Its line was closed; make the rig anew with another line.")
-            self._line = open_line(self._given)
+            self._line = self._open()
         self._parser = wire.Parser()
         self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
         hello = self._greet(1)

@@ -77,7 +77,7 @@ class Duty:
 
     @property
     def watched(self) -> bool:
-        """Whether encoders and drive can be told from hands and friction."""
+        """Whether encoders and drive can be distinguished from hands and friction."""
         return self.watch and self.model is not None and self.at == "inverted" and len(self.model.per_unit) == 2
 
 

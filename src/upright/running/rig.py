@@ -124,6 +124,12 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
     rig = live_rig(file, model, truth)
     bring, let_go, advice = _nothing, _nothing, ""
     if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
+        if abs(tilt) > duty.near:
+            size, unit = (math.degrees(1.0), "deg") if last == "rad" else (1.0, last)
+            raise BadInput(
+                f"a run at '{at}' begins within {size * duty.near:.3g} {unit} of it, and --start is {size * tilt:.3g} "
+                f"{unit}: start nearer."
+            )
         away = np.zeros(2 * len(units))
         away[-2] = tilt
         bring, let_go = partial(rig.port.hold, at, away), rig.port.let_go

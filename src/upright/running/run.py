@@ -20,12 +20,12 @@ from upright.logs import RunLog, read_log
 from upright.logs.layout import library
 from upright.realtime.jitter import TOLERATED
 from upright.realtime.process import run_in_process
-from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
+from upright.realtime.session import RunEnd, RunOrder, RunScene, RunState, carry_out
 from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.protocol import Mode
 from upright.rigs.rigfile import RigFile, read_rig_file
-from upright.running.rig import described, open_loop, read_law, signal, stage_of
+from upright.running.rig import described, open_loop, read_law, signal, stage_of, usual_limits
 
 LEAST = 100
 """Fewest rows of which a last third tells anything."""
@@ -263,10 +263,20 @@ def run_rig(
         rig_text=read_text(request.rig),
         references=references, accepted=request.accept.strip() if basis.level == NOT_TRUSTED else "",
     )  # fmt: skip
+    units = {c.name: c.unit for c in model.plant.coordinates}
+    limits = file.limits(units, model.unit, usual_limits(model))
+    scene = RunScene(
+        readings=tuple(units.items()), command_unit=model.unit, seconds=request.seconds,
+        limit=model.saturation if limits is None else min(model.saturation, limits.command),
+    )  # fmt: skip
+
+    def shown(state: RunState) -> str:
+        return watch(replace(state, scene=scene))
+
     if file.hardware or request.own_process:
-        end = run_in_process(order, watch=watch, paced=file.hardware)
+        end = run_in_process(order, watch=shown, paced=file.hardware)
     else:
-        end = _inline(order, law, watch)
+        end = _inline(order, law, shown)
     log = read_log(path) if path.exists() else None
     return RigRun(request=request, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
 

@@ -192,6 +192,28 @@ class Simulator:
             out[r] = params.get(name, ACTUATOR[name].default if name in ACTUATOR else 0.0)  # type: ignore[arg-type]
         return out
 
+    def stepping(self, params: Array, x0: Array, u: Array) -> Stepping:
+        """One sample of every lane, again and again in the same memory, for motions that are corrected at each.
+
+        Arguments as for `run`; without a loop, and with a flavour that records.
+        """
+        width = 1 if params.shape[1] == 1 else WIDTH
+        call = self.call(params, x0, u, samples=2, width=width)
+        compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
+        events = self._kernel.events if self.flavour.dry else 0
+        working = aligned(call.room)
+        coordinates = self.derived.coordinates
+        locked = [(k, 2 * i) for k, i in enumerate(self.flavour.held) if self.held[coordinates[i]].locked]
+
+        def go() -> None:
+            for k, row in locked:
+                call.base[k] = call.x0[row]
+            compiled(0, call.blocks, *call.arguments, working, events)
+
+        lanes = call.lanes
+        return Stepping(params=call.params[:, :lanes], state=call.x0[:, :lanes], start=call.start[:lanes],
+                        after=call.out[1, :, :lanes], go=go)  # fmt: skip
+
     def run(
         self,
         params: Array,
@@ -365,7 +387,8 @@ class Simulator:
                 lanes, P, X0, u, self._reference, begin, self._grid, base, 0, steps + 1, steps, int(every),
                 int(self.substeps), float(self.dt), scalars, buffer, out, reduced,
             ),
-            lanes=lanes, blocks=blocks, out=out, reduced=reduced, room=room(self._layout, width, buffer),
+            params=P, x0=X0, start=begin, base=base, lanes=lanes, blocks=blocks, out=out, reduced=reduced,
+            room=room(self._layout, width, buffer),
         )  # fmt: skip
 
 
@@ -377,6 +400,8 @@ class Call:
     ----------
     arguments : tuple of int, float or array
         Those of `lanes.RUN_ARGUMENTS` from ``_total`` to ``STAT``.
+    params, x0, start, base : array
+        Those of the arguments that say what is moved, from where, when, and where locked coordinates stay.
     lanes, blocks : int
         Lanes, and blocks of them.
     out, reduced : array
@@ -386,11 +411,30 @@ class Call:
     """
 
     arguments: tuple[int | float | Array | NDArray[np.int64], ...]
+    params: Array
+    x0: Array
+    start: NDArray[np.int64]
+    base: Array
     lanes: int
     blocks: int
     out: Array
     reduced: Array
     room: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stepping:
+    """Memory of motions that are stepped by one sample: write what changes, `go`, and read `after`.
+
+    `params` (rows, lanes), `state` (states, lanes) and `start` (lanes,) are what `Simulator.run` takes, `after`
+    (states, lanes) is the state one sample later. Lanes that only fill up a block keep what they began with.
+    """
+
+    params: Array
+    state: Array
+    start: NDArray[np.int64]
+    after: Array
+    go: Callable[[], None]
 
 
 def ready(a: Array, width: int) -> Array:

@@ -57,12 +57,27 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
         if key in table:
             value, source = table.stated(key, unit)
             entries[key] = Entry(value=value, unit=unit, source=source)
+    entries |= _dac(actuator, rig.parameters["actuator.limit"].unit)
     for sensor, place in read_sensors(study, Section(study.text, (), {}), plant).values():
         entries |= {} if sensor.of else _encoder(place, sensor)  # counts of a sum are not those of its coordinate
     if plant.inputs and drive_sign(study, plant.inputs[0].name) < 0:
         entries[DRIVE_SIGN] = Entry(value=-1.0, unit="1", source="known")
     named = {*logs}.pop() if len({*logs}) == 1 else ""
     return Hardware(name=called or named, vendor=vendor, entries=entries)
+
+
+def _dac(actuator: Section, unit: str) -> dict[str, Entry]:
+    """Step of a converter that its bits and its range, from -range to range, give."""
+    present = [key for key in ("bits", "range") if key in actuator]
+    if not present:
+        return {}
+    if len(present) < 2 or "converter" in actuator:
+        raise actuator.error(
+            present[0], "a converter has bits and range, as in bits = 12, range = \"10 V\" of one from -10 to 10 V, or "
+            "its step alone, converter = \"4.88 mV\""
+        )  # fmt: skip
+    value, source = actuator.stated("range", unit)
+    return {"converter": Entry(value=2 * value / 2 ** actuator.whole("bits", 12, 32), unit=unit, source=source)}
 
 
 def _encoder(section: Section, sensor: Sensor) -> dict[str, Entry]:

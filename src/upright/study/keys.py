@@ -166,6 +166,8 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
                 for name, what in ACTUATOR.items()
             ),
             Key("converter", '"0.3 mV"', "smallest step of the command, for simulations; not rounded if left out"),
+            Key("bits", "12", "of the converter instead of its step, together with"),
+            Key("range", '"10 V"', "its largest command to either side: the step is 2 range/2^bits"),
         ),
     ),
     "sensors": ("[sensors.COORDINATE]", _SENSOR),

@@ -21,7 +21,7 @@ from upright.study.text import Section, as_written, in_si
 _UNIFORM = 0.02  # samples off the grid by less than this part of a period count as on it
 _ON_GRID = 1e-6  # and by less than this as at the grid's instant
 _MOST = 10_000_000  # samples of a run, some 80 MB for each of its signals
-_GAP, _HOPELESS = 5, 100  # periods without a sample: told, refused
+_GAP, _HOPELESS = 5, 100  # periods without a sample: reported, refused
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,12 +90,31 @@ class Sensor:
         """What is measured (N,) [SI] at the record's own instants, its resolution [SI], and what was noticed."""
         readings = record[self.column]
         factor, zero = self.line(record)
-        values = factor * (readings - zero)
+        values = _placed(readings, zero, factor, self.per_count)
         notes: tuple[str, ...] = ()
         if self.coordinate.unit == "rad" and np.abs(np.diff(values)).max(initial=0.0) > 1.5 * math.pi:
             values = np.unwrap(values)
             notes = (f"{self.column} jumps by a turn and was unwrapped",)
         return values, self.resolution or self.per_count, notes
+
+
+def _placed(readings: Array, zero: float, factor: float, step: float) -> Array:
+    """Coordinate [SI] from readings, a text's rounding undone, so that no unit it was written in makes a difference.
+
+    Angles on the grid of an encoder's `step` [SI] are put there; 250 mm are 0.25 m to the last bit.
+    """
+    values = factor * readings
+    if step and np.abs(values).max() < FAR_OFF * step:
+        on_grid = np.round(values / step) * step
+        if 1e-12 * step < float(np.abs(values - on_grid).max()) < ROUNDED * step:
+            return on_grid - factor * zero
+    if abs(factor) in units.PARTS:
+        return units.converted(readings, factor) - units.converted(zero, factor)
+    return factor * (readings - zero)
+
+
+ROUNDED, FAR_OFF = 1e-3, 1e8
+"""Share of an encoder's step within which its text has to lie, and steps beyond which float64 has no room for that."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +134,7 @@ class Drive:
         """Command (N,) in the drive's unit at the record's own instants."""
         if not self.what:
             return np.zeros(record.t.size)
-        return self.sign * self.scale * expressions.evaluate(self.what, record.signals, record.t)
+        return self.sign * units.converted(expressions.evaluate(self.what, record.signals, record.t), self.scale)
 
 
 @dataclass(frozen=True, kw_only=True)

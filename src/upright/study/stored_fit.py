@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -65,6 +66,17 @@ class StoredFit:
             return find(self.plant)
         before_running(self.plant, self.path)
         return find(self.plant, self.path.parent)
+
+    def fitted_run(self, source: str) -> str:
+        """Label of a fitted run that shares samples with a run of this `source`; empty where none does."""
+        log, start, stop = _stretch(source)
+        origins: Any = (self.content.get("provenance") or {}).get("runs") or {}
+        scores: Any = self.content.get("runs") or {}
+        for label, origin in origins.items() if log else ():
+            other, first, last = _stretch(str(origin))
+            if other == log and first < stop and start < last and (scores.get(label) or {}).get("role") == "fit":
+                return str(label)
+        return ""
 
     def rig(self, *, seed: int = 0, draws: int = 200) -> Rig:
         """The rig as identified, and rigs drawn from the fit's covariance.
@@ -137,6 +149,13 @@ class StoredFit:
         if correlation.shape != (len(estimated), len(estimated)):
             correlation = np.zeros((len(estimated), len(estimated)))
         return names, correlation[np.ix_(places, places)] * np.outer(errors, errors)
+
+
+def _stretch(source: str) -> tuple[str, float, float]:
+    """The sha256 of a run's log, and which seconds of it the run is; "" for a log without one."""
+    log, window = re.search(r"\(sha256 (\w+)\)", source), re.search(r"; ([-+.\de]+) to ([-+.\de]+) s(?:;|$)", source)
+    seconds = (float(window[1]), float(window[2])) if window else (-math.inf, math.inf)
+    return log[1] if log else "", *seconds
 
 
 def read_fit(path: Path) -> StoredFit:

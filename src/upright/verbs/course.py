@@ -131,6 +131,9 @@ def lab(
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
+    rig = os.fspath(rig) if isinstance(rig, os.PathLike) else rig
+    if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
+        raise BadInput(f"a laboratory's rig is a make, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
     itself = rig.endswith(".toml") or rig.startswith("serial:")
     if rig and not itself:
         make_named(rig)
@@ -300,7 +303,7 @@ def survey(
     n : int, optional
         Answers behind printed means or shares, at least 2.
     scale : str or (int, int)
-        Ends of the scale of the ratings.
+        Ends of the scale of the ratings, ``"1-4"`` or ``"0-100"``; people may rate between its whole numbers.
     out : path, optional
         Folder for report.html.
     pdf : bool
@@ -325,7 +328,7 @@ def survey(
     if n is not None and n < 2:
         raise BadInput(f"--n needs a whole number of at least 2, got {n}.")
     scale_text = scale if isinstance(scale, str) else f"{scale[0]}-{scale[1]}"
-    ends = re.fullmatch(r"\s*(\d{1,2})\s*(?:-|to)\s*(\d{1,2})\s*", scale_text)
+    ends = re.fullmatch(r"\s*(\d{1,3})\s*(?:-|to)\s*(\d{1,3})\s*", scale_text)
     if ends is None or int(ends[1]) >= int(ends[2]):
         raise BadInput(f"--scale needs its two ends, such as 1-4, got '{scale_text}'.")
     limits = (int(ends[1]), int(ends[2]))

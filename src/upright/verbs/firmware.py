@@ -37,7 +37,7 @@ def firmware_build(
     Parameters
     ----------
     board : str
-        ``"mega"``, an Arduino Mega 2560.
+        ``"mega"``, an Arduino Mega 2560, or ``"pico"``, a Raspberry Pi Pico.
     drive : str
         ``"analog"``: a converter into a servo amplifier; ``"pair"``: an H-bridge with a PWM line for each way
         (BTS7960, DRV8871); ``"sign"``: one PWM line and the way (VNH5019, L298N).
@@ -121,13 +121,13 @@ def firmware_flash(
 
     made = board_of(board)
     image = build(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
-    done = flash(made, image.path, port, hand=hand)
+    flashed = flash(made, image.path, port, hand=hand)
     return Answer(
-        done,
+        flashed,
         Chapter(
-            title=f"Firmware on the {made.title}", verdict=f"{done.greeting} answers.",
+            title=f"Firmware on the {made.title}", verdict=f"{flashed.greeting} answers.",
             detail="It was read back as it was written. It stands in FAULT until a host clears it.",
-            numbers={"port": done.port, "image": str(done.image), "greeting": done.greeting},
+            numbers={"port": flashed.port, "image": str(flashed.image), "greeting": flashed.greeting},
         ),
         [image.path],
     )  # fmt: skip

@@ -157,7 +157,7 @@ def _stem(log: Path) -> str:
     names={"html": "-o --html"},
     metavars={"rig": "RIG", "html": "FILE"},
     helps={"rig": "Plant (furuta, torsional-2, ...), study (TOML) or fit.json of the rig."},
-    wrong=lambda found: bool(found.value.wrong),
+    wrong=lambda answer: bool(answer.value.wrong),
     more="""
         upright doctor run.csv
         upright doctor run.csv --rig furuta
@@ -355,8 +355,8 @@ def init(
     if beside is not None:
         record.to_csv(beside)
         files.append(beside)
-    told = ("# Fits ", "# GUESSED")
-    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(told)]
+    marks = ("# Fits ", "# GUESSED")
+    guessed = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(marks)]
     marked = (
         line.removeprefix("# ").split(" =")[0] for line in text.splitlines() if "MEASURE" in line and " = " in line
     )

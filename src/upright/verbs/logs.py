@@ -14,6 +14,7 @@ from upright.files import PathLike, check_output, keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder
+from upright.verbs.values import path_of
 
 if TYPE_CHECKING:
     from upright.logs import RunLog
@@ -59,6 +60,7 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     from upright.report.run import chapter, draw_run
     from upright.verbs.log import picture_path
 
+    log = path_of(log, "the log of a run")
     run = read_log(log)
     files: list[Path] = []
     if (plot or out is not None) and len(run) > 1:
@@ -115,6 +117,7 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
     """
     from upright.logs import follow
 
+    log = path_of(log, "the log of a run")
     if not Path(log).exists():
         raise BadInput(f"There is no file '{log}'; check the path, or start the run first.")
     clock, last = threading.Event(), time.monotonic()
@@ -155,6 +158,7 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
     from upright.logs import recover
     from upright.report.run import recovered_chapter
 
+    log = path_of(log, "the log of a run")
     at = Path(f"{Path(log).stem}-recovered.mcap") if out is None else Path(out)
     salvaged = recover(log, at)
     return Answer(salvaged, recovered_chapter(salvaged), [at])
@@ -187,6 +191,7 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     from upright.logs import read_log
     from upright.report.page import Chapter, Part, Points
 
+    log = path_of(log, "the log of a run")
     at = Path(f"{Path(log).stem}.csv") if out is None else Path(out)
     if at.suffix not in _CONVERTED:
         raise BadInput(f"a log is converted to a file ending in {', '.join(_CONVERTED)}, got '{os.fspath(at)}'.")
@@ -235,6 +240,7 @@ def log_replay(log: PathLike) -> Answer[Replay]:
     from upright.logs.replay import replay
     from upright.report.run import replayed
 
+    log = path_of(log, "the log of a run")
     run = read_log(log)
     again = replay(run)
     return Answer(again, replayed(run, again))

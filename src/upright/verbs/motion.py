@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 def simulate(
     plant: Any, law: Any = None, *, start: Mapping[str, Any] | ArrayLike | None = None, seconds: float | str = 5.0,
     at: str | None = None, u: float | Callable[[float], Any] | ArrayLike | None = None, dt: float | str | None = None,
-    limit: float = math.inf, counts: float | Mapping[str, float] | None = None, memory: float = 0.0,
+    limit: float | str | None = None, counts: float | Mapping[str, float] | None = None, memory: float = 0.0,
     actuator: Mapping[str, float] | None = None,
 ) -> Record:  # fmt: skip
     """Motion of a plant, free, driven, or with its loop closed by gains or a law.
@@ -35,7 +35,8 @@ def simulate(
     plant : Plant, Rig or fit
         Of a rig or a fit its drive, encoders and servo period count as well, where they are known and not given here.
     law : Gains, array of gains, Law or Rule, optional
-        Gains act on readings sampled every `dt`, less the equilibrium, and on their differences.
+        Gains act on readings sampled every `dt`, less the equilibrium, and on their differences; an array gives the
+        plant's force, of a rig or a fit its command.
     start : mapping of state to number or text, or array, shape (states,), optional
         Deviation from the equilibrium at the first instant: ``{"theta": 0.2}``, ``{"theta": "12 deg"}``, ``[0.2, 0]``.
     seconds : float or str
@@ -46,8 +47,8 @@ def simulate(
         Command, in the unit of the input or of the rig's command; it is added to the law's.
     dt : float or str, optional
         Between samples [s]; the period that gains or law are for, else the rig's, else 1 ms.
-    limit : float
-        Largest command.
+    limit : float or str, optional
+        Largest command; the rig's when omitted, none of a plant alone.
     counts : float or mapping of coordinate to float, optional
         Encoder counts per turn or metre; without it readings are not rounded.
     memory : float
@@ -82,23 +83,29 @@ def simulate(
         raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
     samples = round(seconds / dt) + 1
     t = np.arange(samples, dtype=np.float64) * dt
-    own_drive = {f"actuator.{name}": float(value) for name, value in (actuator or {}).items()}
+    if actuator is not None and not isinstance(actuator, Mapping):  # type: ignore[reportUnnecessaryIsInstance]
+        raise BadInput(f"actuator has numbers of the drive by name, such as {{'gain': 0.5}}, got {actuator!r:.40}.")
+    own_drive = {f"actuator.{name}": si(value, "") for name, value in (actuator or {}).items()}
     drive = ({} if rig is None else dict(rig.drive)) | own_drive
     for name in own_drive:
         if name not in ACTUATOR:
             known = [n.partition(".")[2] for n in ACTUATOR]
             short = name.partition(".")[2]
             raise BadInput(f"the drive has no number '{short}'; {nearest(short, known)} (it has {', '.join(known)})")
-    if limit < math.inf:
-        drive["actuator.limit"] = limit
-    limit = drive.get("actuator.limit", math.inf)
+    if limit is not None and not (isinstance(limit, float) and limit == math.inf):
+        drive["actuator.limit"] = si(limit, (rig and rig.unit) or (plant.inputs[0].unit if plant.inputs else "1"))
+    largest = drive.get("actuator.limit", math.inf)
+    if not largest > 0:
+        raise BadInput(f"simulate needs a limit above 0, got {largest:g}.")
     if counts is None and rig is not None:
         stated = {c.name: f"counts.{c.name}" for c in plant.coordinates}
         counts = {n: rig.hardware.value(key, 0.0) for n, key in stated.items() if key in rig.hardware.entries}
     steps = _steps(plant, counts)
-    loop = _loop(plant, law, point, dt, memory, limit, steps)
+    loop = _loop(plant, law, point, dt, memory, largest, steps)
     if rig is not None and isinstance(loop, Law):  # late and rounded as the rig is, once
         loop = replace(loop, delay=0.0, resolution=steps, command_resolution=rig.converter)
+    if rig is not None and not isinstance(law, Gains | Law | Rule | None):
+        _check_gains(rig, np.atleast_2d(np.asarray(law, dtype=np.float64)), point)
     command = _command(u, t, len(plant.inputs))
     x = motion(plant, drive, x0, command, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
     _check_bounded(t, x[:, : len(names)], names)
@@ -106,7 +113,7 @@ def simulate(
     put_out = x[:, len(names) :] if loop is not None else command
     commands = {}
     for j, i in enumerate(plant.inputs):
-        commands[i.name] = np.zeros(samples) if put_out is None else np.clip(put_out[:, j], -limit, limit)
+        commands[i.name] = np.zeros(samples) if put_out is None else np.clip(put_out[:, j], -largest, largest)
     return Record(
         t=t, signals=signals | commands,
         units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
@@ -114,6 +121,21 @@ def simulate(
         provenance=Provenance(reader="simulation", rig=type(plant).__name__,
                               notes=("This log was simulated; no rig was touched.",)),
     )  # fmt: skip
+
+
+def _check_gains(rig: Rig, K: Array, point: Mapping[str, float]) -> None:
+    """Refuse an array that stabilises the plant by a force and not the rig by its command."""
+    at = min(rig.plant.equilibria, key=lambda name: _apart(rig.plant.equilibrium(name), point))
+    by_force, by_command = (
+        float(np.linalg.eigvals(m.A - m.B @ K).real.max()) for m in (rig.plant.linear(at), rig.linear(at))
+    )
+    if by_force < 0 <= by_command:
+        force = rig.plant.inputs[0].unit
+        raise BadInput(
+            f"these gains stabilise the plant by a force [{force}], and not the rig by its command [{rig.unit}]: a "
+            f'rig takes gains for its command, such as up.place(rig.linear("{at}"), ...); gains of a force belong to '
+            "rig.plant, or divide them by rig.gain."
+        )
 
 
 def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
@@ -223,8 +245,8 @@ def _steps(plant: Plant, counts: float | Mapping[str, float] | None) -> Array:
     for name, number in per.items():
         if name not in names:
             raise BadInput(f"counts names coordinates, got '{name}'; {nearest(name, names)}")
-        if not number > 0:
-            raise BadInput(f"counts takes numbers above 0, got {number} for '{name}'.")
+        if not isinstance(number, int | float) or not number > 0:  # type: ignore[reportUnnecessaryIsInstance]
+            raise BadInput(f"counts takes numbers above 0, got {number!r:.40} for '{name}'.")
     turn = {c.name: math.tau if c.unit == "rad" else 1.0 for c in plant.coordinates}
     return np.array([turn[n] / per[n] if n in per else 0.0 for n in names])
 
@@ -251,7 +273,10 @@ def _command(u: Any, t: Array, inputs: int) -> Array | None:
     if u is None:
         return None
     try:
-        values = np.asarray([u(float(s)) for s in t] if callable(u) else u, dtype=np.float64)
+        given = np.asarray([u(float(s)) for s in t] if callable(u) else u)
+        if np.iscomplexobj(given):
+            raise TypeError("complex")
+        values = given.astype(np.float64)
     except (TypeError, ValueError):
         raise BadInput(
             f"u is a command, a function of time that gives one, or an array of them, got {u!r:.40}."

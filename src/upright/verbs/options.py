@@ -36,7 +36,7 @@ class RigOptions(TypedDict, total=False):
     period : float or str, optional
         Servo period [s]; the study's when omitted.
     counts : float, str, sequence or mapping, optional
-        Encoder counts per turn or metre, "4096" or "x=20000, theta=4096"; the study's when omitted.
+        Encoder counts per turn or metre, "4096", "20000, 4096" or "x=20000, theta=4096"; the study's when omitted.
     vendor : str, optional
         Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
     """
@@ -179,6 +179,8 @@ def as_typed(on: Mapping[str, Any]) -> str:
         value = on.get(name)
         if isinstance(value, Mapping):
             value = ", ".join(f"{k}={v}" for k, v in value.items())
+        if isinstance(value, list | tuple):
+            value = ", ".join(str(v) for v in value)
         if value not in (None, ""):
             out += f" --{name} " + (f"{value:g}" if isinstance(value, int | float) else f'"{value}"')
     return out
@@ -198,22 +200,23 @@ def vendor_of(known: Rig, rig: str, on: RigOptions, source: str) -> str:
 
 
 def _counts(counts: Counts | None, names: list[str]) -> dict[str, float]:
-    """Counts by coordinate; a number alone is for all of them."""
-    if (
-        counts is None
-        or (isinstance(counts, Mapping) and not counts)
-        or (isinstance(counts, str) and not counts.strip())
-    ):
-        return {}
-    if isinstance(counts, list | tuple):
-        if len(counts) != len(names):
-            raise BadInput(f"counts needs {len(names)} numbers, one for each coordinate, got {len(counts)}.")
-        counts = dict(zip(names, counts, strict=True))
-    text = str(counts)
+    """Counts by coordinate; a number alone is for all of them, several are for one each."""
     if isinstance(counts, Mapping):
-        text = ",".join(f"{name}={value}" for name, value in counts.items())
+        pieces = [f"{name}={value}" for name, value in counts.items()]
+    elif isinstance(counts, list | tuple):
+        pieces = [str(value) for value in counts]
+    else:
+        pieces = ("" if counts is None else str(counts)).split(",")
+    if not "".join(pieces).strip():
+        return {}
+    plain = sum("=" not in piece for piece in pieces)
+    if plain > 1 and not plain == len(pieces) == len(names):
+        raise BadInput(
+            f"counts takes one number for all coordinates, one for each of {', '.join(names)}, or named ones such as "
+            f'"{names[0]}=4096", got {str(counts)[:40]}.'
+        )
     per: dict[str, float] = {}
-    for piece in text.split(","):
+    for i, piece in enumerate(pieces):
         name, equals, value = piece.rpartition("=")
         name = name.strip()
         if equals and name not in names:
@@ -228,5 +231,5 @@ def _counts(counts: Counts | None, names: list[str]) -> dict[str, float]:
             raise BadInput(
                 f"--counts takes numbers above 0, got '{piece.strip()[:40]}'; write 4096 or \"{names[0]}=4096\"."
             )
-        per |= {name: number} if equals else dict.fromkeys(names, number)
+        per |= {name: number} if equals else {names[i]: number} if plain > 1 else dict.fromkeys(names, number)
     return per

@@ -7,11 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from upright.errors import BadInput
 from upright.files import keeps_its_inputs
+from upright.renamed import renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, page_folder, write_page
-from upright.verbs.values import si_if_given
+from upright.verbs.values import Start, path_of, read_start
 
 if TYPE_CHECKING:
     from upright.realtime.jitter import Jitter
@@ -22,10 +24,10 @@ if TYPE_CHECKING:
 
 @command(
     "Control",
-    names={"rig": "--rig"},
+    names={"rig": "--rig", "start": "--start --tilt"},
     metavars={
         "rig": "RIG.toml", "law": "GAIN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
-        "tilt": "ANGLE", "accept": "REASON",
+        "start": "ANGLE", "accept": "REASON",
     },
     helps={
         "rig": "What the rig is, and how far it may go.",
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
         "reference": 'That the law follows: "square 0.3 8".',
         "duration": "How long.",
     },
-    wrong=lambda done: not done.value.sound,  # whether it ran, whatever its model is worth
+    wrong=lambda answer: not answer.value.sound,  # whether it ran, whatever its model is worth
     more="""
     Space, q, Esc or Ctrl-C stop it: zero first.
     This is software, not a rated safety function: keep a stop in hardware within reach.
@@ -42,10 +44,11 @@ if TYPE_CHECKING:
     upright run --rig RIG.toml --excite "sweep 0.5 0.5 8" --duration 60
     """,
 )  # fmt: skip
+@renamed({"tilt": ("start", lambda value: value)})
 @keeps_its_inputs
 def run(
     rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str = "", reference: str = "",
-    duration: float = 30.0, mode: str = "host", tilt: float | str = "", check: bool = True, watch: bool = True,
+    duration: float = 30.0, mode: str = "host", start: Start = "", check: bool = True, watch: bool = True,
     accept: str = "", out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "",
 ) -> Answer[RigRun]:  # fmt: skip
@@ -70,8 +73,8 @@ def run(
         [s].
     mode : str
         ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
-    tilt : float or str, optional
-        Of the last coordinate when the hand of a twin lets go [rad or m].
+    start : str or mapping, optional
+        Deviation of the last coordinate when the hand of a twin lets go, ``"5 deg"``; a number is [rad or m].
     check : bool
         Compare a small pulse with the model first.
     watch : bool
@@ -100,10 +103,10 @@ def run(
     from upright.running.run import RunRequest, run_rig
 
     folder = page_folder(out, pdf)
-    leaning = si_if_given(tilt, "rad") or 0.0
     request = RunRequest(
-        rig=Path(rig), law=None if law is None else Path(law), excite=excite, reference=reference, seconds=duration,
-        mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
+        rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
+        excite=excite, reference=reference, seconds=duration,
+        mode=mode, tilt=_let_go(start, path_of(rig, "the rig that runs")), check=check, watch=watch, accept=accept,
     )  # fmt: skip
     result = run_rig(request, folder, watch=observe)
     written = run_chapter(result)
@@ -111,11 +114,26 @@ def run(
     return Answer(result, written, [*([result.log_path] if result.log is not None else []), *page])
 
 
+def _let_go(start: Start | float, rig: Path) -> float:
+    """Deviation of the last coordinate [SI], at rest and the others in the middle, as a hand lets go."""
+    if start == "" or isinstance(start, int | float):
+        return float(start or 0.0)
+    from upright.rigs.rigfile import read_rig_file
+    from upright.running.rig import described
+
+    model, _ = described(read_rig_file(rig))
+    found = read_start(start, model.states, model.state_units)
+    last = model.states[-2]
+    if any(value for name, value in found.items() if name != last):
+        raise BadInput(f'the hand of a twin lets go of {last} at rest; --start takes its deviation, such as "5 deg".')
+    return found.get(last, 0.0)
+
+
 @command(
     name="rig check",
     metavars={"rate": "HZ"},
     defaults={"out": "rig-check"},
-    wrong=lambda done: not done.chapter.sound,
+    wrong=lambda answer: not answer.chapter.sound,
     more="""
     Measure with everything running that will run beside the loop.
 
@@ -177,7 +195,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     metavars={"rig": "RIG.toml"},
     helps={"rig": "What the rig is, and how far it may go."},
     prepare=_for_hardware,
-    wrong=lambda done: not done.chapter.sound,
+    wrong=lambda answer: not answer.chapter.sound,
     more="""
     Let the rig hang freely, with nobody in its way: the pulse moves it.
 
@@ -218,5 +236,6 @@ def rig_doctor(
     from upright.running.chapter import checkup_chapter
     from upright.running.doctor import check_up
 
-    checkup = check_up(Path(rig), hand=hand, clear=clear, pulse=pulse)
-    return Answer(checkup, checkup_chapter(checkup, typed(Path(rig))))
+    file = path_of(rig, "a rig on hardware")
+    checkup = check_up(file, hand=hand, clear=clear, pulse=pulse)
+    return Answer(checkup, checkup_chapter(checkup, typed(file)))

@@ -116,13 +116,14 @@ def read_start(start: Start | None, states: Sequence[str], units: Sequence[str])
     """
     from upright.units import scale
 
-    if not start:
-        return {}
+    values: dict[str, float | str]
     if isinstance(start, str):
         pieces = [piece.rpartition("=") for piece in start.split(",") if piece.strip()]
-        values: dict[str, float | str] = {(name.strip() or states[-2]): value for name, _, value in pieces}
+        values = {(name.strip() or states[-2]): value for name, _, value in pieces}
+    elif start is None or isinstance(start, Mapping):  # type: ignore[reportUnnecessaryIsInstance]
+        values = dict(start or {})
     else:
-        values = dict(start)
+        raise BadInput(f"a start names states, such as {{'{states[-2]}': '5 deg'}} or '5 deg', got {start!r:.40}.")
     unit = dict(zip(states, units, strict=True))
     for name in values:
         if name not in unit:
@@ -163,7 +164,24 @@ def pairs(value: Mapping[str, T] | Sequence[str] | str | None, option: str) -> d
 
 def texts(value: Sequence[str] | str | None) -> tuple[str, ...]:
     """Several texts of an option that may be one or none."""
-    return (value,) if isinstance(value, str) and value else tuple(value or ())
+    if isinstance(value, str):
+        return (value,) if value else ()
+    if value is not None and not isinstance(value, Iterable):  # type: ignore[reportUnnecessaryIsInstance]
+        raise BadInput(f"a text or several were needed, got {value!r:.40}.")
+    return tuple(value or ())
+
+
+def path_of(value: Any, what: str) -> Path:
+    """The path that something is named by.
+
+    Raises
+    ------
+    BadInput
+        When it is none.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise BadInput(f"{what} is named by its file, got {type(value).__name__}.")
+    return Path(value)
 
 
 def paths(value: Sequence[T] | T | None) -> tuple[T, ...]:

@@ -56,6 +56,6 @@ def experiment(ascent=None, **parts) -> SwingUpRun:
     """Experiment 2b with this way up."""
     rest = {
         "model": RIG, "truth": replace(RIG, seed=3), "log": None, "check": GOOD, "law": LAW, "ascent": ascent,
-        "lies": (), "source": "", "folder": Path("up"),
+        "faulty": (), "source": "", "folder": Path("up"),
     }  # fmt: skip
     return SwingUpRun(**(rest | parts))

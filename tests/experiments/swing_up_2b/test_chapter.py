@@ -8,7 +8,7 @@ import pytest
 
 from tests.experiments.swing_up_2b.closed_form import BAD, GOOD, LAW, RIG, climbed, experiment
 from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
-from upright.experiments.swing_up_2b.run import LIES, Lie
+from upright.experiments.swing_up_2b.run import FAULTS, FaultyEncoder
 
 UP = "with at most 8 of 10 V and 0.6 of 1.5 rad of travel"
 
@@ -18,7 +18,7 @@ def lie(**what):
         "name": "theta", "factor": -0.5, "estimate": 0.49987, "error": 0.001, "refused": True, "spoke": 0.0123,
         "tilt": math.radians(7.5), "suspicion": "theta", "fell": 0.2345,
     }  # fmt: skip
-    return Lie(**(rest | what))
+    return FaultyEncoder(**(rest | what))
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_lies_are_counted_by_who_notices_them_and_when():
         lie(refused=False, spoke=math.inf, tilt=0.0, suspicion="", fell=math.inf),
         lie(fell=math.inf),
     )  # fmt: skip
-    told = chapter(experiment(climbed(), lies=lies))
+    told = chapter(experiment(climbed(), faulty=lies))
     points, table = told.parts[2].content
     assert points.sentences == (
         "Hanging, 3 of 4 lies are found before a loop is closed. A loop started 3 degrees from upright falls with 2 "
@@ -116,7 +116,7 @@ def test_lies_are_counted_by_who_notices_them_and_when():
     assert table.rows[1] == ("theta", "4", "0.4999", "500", "7.5", "theta", "300")
     assert table.rows[2] == ("theta", "−0.5", "0.4999", "–", "–", "–", "stands")
     assert table.numbers == (1, 2, 3, 4, 6)
-    assert told.numbers["lies_tried"] == len(LIES)
+    assert told.numbers["lies_tried"] == len(FAULTS)
     assert told.numbers["lies"][0]["fell"] == 0.2345
     assert chapter(experiment(climbed())).numbers["lies_tried"] == 0
 

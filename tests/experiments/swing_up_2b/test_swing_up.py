@@ -12,7 +12,7 @@ import pytest
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
-from upright.experiments.swing_up_2b.run import LIES, known_of, run_swing_up, scales_of_log
+from upright.experiments.swing_up_2b.run import FAULTS, known_of, run_swing_up, scales_of_log
 from upright.files import plain_values
 from upright.physics import Furuta
 from upright.records import Record
@@ -52,13 +52,13 @@ def test_the_logs_are_those_of_a_program_at_the_rig(done):
 
 @pytest.mark.slow
 def test_every_lie_is_told_before_a_loop_is_closed_or_falls(done):
-    assert len(done.lies) == len(LIES)
-    for lie in done.lies:
+    assert len(done.faulty) == len(FAULTS)
+    for lie in done.faulty:
         assert lie.refused
         assert lie.estimate == pytest.approx(lie.factor, rel=0.02)
         if math.isfinite(lie.fell):
             assert lie.spoke < lie.fell
-    assert any(math.isfinite(lie.fell) for lie in done.lies)
+    assert any(math.isfinite(lie.fell) for lie in done.faulty)
 
 
 def test_no_loop_is_closed_on_a_lying_encoder(tmp_path):

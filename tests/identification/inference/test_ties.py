@@ -1,4 +1,4 @@
-"""Numbers that cannot be told apart are named as a pair, with the sum that is known."""
+"""Numbers that cannot be separated are named as a pair, with the sum that is known."""
 
 from __future__ import annotations
 
@@ -83,4 +83,4 @@ def test_the_verdict_lists_no_number_that_is_tied_and_says_the_sum() -> None:
     for name in ("b_2", "b_2c"):
         assert fit.estimates[name].status != "well determined"
         assert name not in usable.headline
-    assert any("b_2 and b_2c cannot be told apart" in reason for reason in usable.reasons)
+    assert any("b_2 and b_2c cannot be separated" in reason for reason in usable.reasons)

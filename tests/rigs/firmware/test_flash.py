@@ -11,7 +11,9 @@ import pytest
 
 from upright.errors import BadInput, RigStopped
 from upright.rigs.firmware import board_of, flash
-from upright.rigs.firmware.flash import in_time
+
+module = sys.modules[flash.__module__]
+in_time = module.in_time
 
 MEGA, IMAGE = board_of("mega"), Path("atmega2560-pair.hex")
 ARDUINO, OTHER = 0x2341, 0x1234
@@ -95,3 +97,20 @@ def test_without_the_flasher_it_is_named(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda tool: None)
     with pytest.raises(BadInput, match="sudo apt install avrdude"):
         flashed(Flasher(), port="COM3")
+
+
+def test_a_pico_is_a_drive_that_gets_its_image(tmp_path, monkeypatch):
+    image = tmp_path / "pico-pair.uf2"
+    image.write_bytes(b"image")
+    pico = board_of("pico")
+    (tmp_path / "RPI-RP2").mkdir()
+    (tmp_path / "RPI-RP2" / "INFO_UF2.TXT").write_text("UF2 Bootloader v3.0", encoding="utf-8")
+    monkeypatch.setattr(module, "drives", lambda: [tmp_path / "RPI-RP2"])
+    with pytest.raises(RigStopped, match="Nothing was written"):
+        flash(pico, image, hand=lambda _: False)
+    done = flash(pico, image, "COM5", greet=lambda port: f"firmware at {port}")
+    assert (tmp_path / "RPI-RP2" / "pico-pair.uf2").read_bytes() == b"image"
+    assert done.greeting == "firmware at COM5"
+    monkeypatch.setattr(module, "drives", list)
+    with pytest.raises(BadInput, match=r"hold BOOTSEL while you plug it in.*no such drives"):
+        flash(pico, image)

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
+from docs.drawings import IMAGES, drawings
 from upright.rigs.firmware import BOARDS, pins, wiring
 
 EVERY = [(board, drive) for board in BOARDS.values() for drive in board.drives]
@@ -32,6 +33,28 @@ def test_numbers_on_a_mega_are_arduino_s(drive):
         assert MEGA[pin.number] == pin.name
 
 
+def test_numbers_of_a_pico_can_do_what_they_are_for():
+    """RP2040's data sheet, table 2 (functions of GP0, GP1, GP16, GP17), and the Pico's, 2.1 (GP25 is its LED)."""
+    by_signal = {pin.signal: pin for pin in pins(BOARDS["pico"], "pair")}
+    assert {n: by_signal[n].number for n in ("HOST_TX", "HOST_RX", "FORWARD", "REVERSE", "LED")} == {
+        "HOST_TX": 0, "HOST_RX": 1, "FORWARD": 16, "REVERSE": 17, "LED": 25,
+    }  # fmt: skip
+    assert all(pin.name == f"GP{pin.number}" for pin in by_signal.values())
+
+
+@pytest.mark.parametrize(("board", "volts"), [("atmega2560", "5 V"), ("pico", "3V3")])
+def test_encoders_are_drawn_at_the_supply_that_the_pins_stand(board, volts):
+    """An RP2040's pin stands 3.63 V (data sheet, 5.5.3)."""
+    drawn = wiring(BOARDS[board], "pair", pins(BOARDS[board], "pair"))
+    assert drawn.count(f">{volts}<") == 2
+    assert ("5 V" in drawn) == (volts == "5 V")
+
+
+def test_the_drawings_of_the_page_are_those_of_the_tables():
+    for name, svg in drawings().items():
+        assert (IMAGES / name).read_text(encoding="utf-8") == svg, f"{name} is out of date; run python -m docs"
+
+
 @pytest.mark.parametrize(("board", "drive"), EVERY, ids=lambda v: getattr(v, "name", v))
 def test_every_wire_is_drawn_between_its_pin_and_its_terminal(board, drive):
     wires = pins(board, drive)
@@ -41,6 +64,6 @@ def test_every_wire_is_drawn_between_its_pin_and_its_terminal(board, drive):
     heights = {float(line.get("y1")) for line in root.iter(f"{kind}line")}
     assert all(line.get("y1") == line.get("y2") for line in root.iter(f"{kind}line"))
     for pin in wires:
-        (y,) = [at for text, at in texts if text == f"{pin.number}  {pin.name}"]
+        (y,) = [at for text, at in texts if text in (f"{pin.number}  {pin.name}", f"GP{pin.number}")]
         assert (pin.terminal, y) in texts
         assert any(abs(height - y) < 6 for height in heights)  # of letters

@@ -1,7 +1,7 @@
 """Experiment 1b at a rig: all frequencies at once while it hangs, as strongly as its travel allows, and fits of that.
 
 Short probes, each stronger than the one before, show what a unit of command does on this rig; the last and longest run
-asks for motion that keeps clear of dry friction and counts and stays well within the travel. Its response is told
+asks for motion that keeps clear of dry friction and counts and stays well within the travel. Its response is reported
 frequency by frequency; the numbers come from the motion itself, which knows dry friction for what it is, and are held
 against the last probe, which they have not seen.
 """

@@ -10,6 +10,7 @@ from upright.control import Score
 from upright.control.effort import FELT, RestEffort, of_limit, shown
 from upright.control.preflight import BUSY, SATURATED, STABILISED, WORDS, word
 from upright.control.score import effort_at_rest
+from upright.designing.run import Designed, DesignRequest, design_for
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import DRAWS, SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
@@ -89,6 +90,18 @@ def _recommended(result: Regulation) -> str:
     )
 
 
+def design_of_best(result: Regulation) -> Designed | None:
+    """The recommended set as a design, of the loop that was predicted; None where no set is recommended."""
+    best, rig, request = result.best, result.rig, result.request
+    if not best.before.basis.supports or best.before.words[STABILISED] < 0.5:
+        return None
+    return design_for(rig, DesignRequest(
+        at=result.task.at, poles=best.placement.requested, period=rig.period, delay=rig.delay / rig.period,
+        speed=request.speed, memory=request.memory, resolution=tuple(rig.resolution.tolist()),
+        limit=rig.saturation if math.isfinite(rig.saturation) else None, start=result.task.start, on=rig,
+    ))  # fmt: skip
+
+
 def _of_rigs(result: Regulation, share: float) -> str:
     rigs, of = result.request.draws, "sampled from the fit's covariance" if result.uncertain else "sampled"
     some = round(share * rigs)
@@ -151,9 +164,10 @@ def _sentence(result: Regulation, a: Attempt) -> str:
         f" ({_shares(a)}); {reach}; predicted peak {b.score.effort_peak:.2g} of {rig.limit:g} {rig.unit}; rms at rest "
         f"{of_limit(b.rest_rms)}."
     )
-    if a.after is None or a.came is None:
+    if a.after is None or a.measured is None:
         return f"{predicted} It was not run." if result.ran else predicted
-    return f"{predicted} {_came(result.rig, a.came.score, effort_at_rest(a.after))} {a.came.ended}".rstrip()
+    measured = _measured_sentence(result.rig, a.measured.score, effort_at_rest(a.after))
+    return f"{predicted} {measured} {a.measured.ended}".rstrip()
 
 
 def _probability(a: Attempt, share: float) -> str:
@@ -167,7 +181,7 @@ def _shares(a: Attempt) -> str:
     return ", ".join(f"{w} {in_percent(a.before.words[w])}" for w in WORDS if a.before.words[w] > 0)
 
 
-def _came(rig: Rig, s: Score, rest: RestEffort) -> str:
+def _measured_sentence(rig: Rig, s: Score, rest: RestEffort) -> str:
     driven = plain(rig.plant.inputs[0].on)
     if not s.held and s.fell < s.ran_out:
         return f"Measured: it fell after {s.fell:.2g} s."
@@ -379,7 +393,7 @@ def _numbers(result: Regulation) -> dict[str, Any]:
 
 def _set(a: Attempt) -> dict[str, Any]:
     b = a.before
-    came = a.came
+    measured = a.measured
     return {
         "poles": a.placement.requested,
         "K": a.placement.K[0],
@@ -390,8 +404,9 @@ def _set(a: Attempt) -> dict[str, Any]:
             "margins": b.margins, "rest": _rest(b.rest),
             **_scored(b.score),
         },
-        "after": None if came is None else {
-            "word": a.word, "ended": came.ended, "rest": _rest(effort_at_rest(came.trial)), **_scored(came.score),
+        "after": None if measured is None else {
+            "word": a.word, "ended": measured.ended, "rest": _rest(effort_at_rest(measured.trial)),
+            **_scored(measured.score),
         },
     }  # fmt: skip
 

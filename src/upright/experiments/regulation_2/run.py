@@ -71,7 +71,7 @@ class RegulationRequest:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Came:
+class MeasuredRun:
     """What came of a law: the run with its figures, and why it ended early, as a sentence."""
 
     trial: Trial
@@ -87,17 +87,17 @@ class Attempt:
     placement: Placement
     law: Law
     before: Preflight
-    came: Came | None
+    measured: MeasuredRun | None
 
     @property
     def after(self) -> Trial | None:
         """The run itself."""
-        return None if self.came is None else self.came.trial
+        return None if self.measured is None else self.measured.trial
 
     @property
     def score(self) -> Score | None:
         """Its figures."""
-        return None if self.came is None else self.came.score
+        return None if self.measured is None else self.measured.score
 
     @property
     def word(self) -> str:
@@ -166,7 +166,7 @@ class Regulation:
     @property
     def ran(self) -> tuple[Attempt, ...]:
         """The sets that were run."""
-        return tuple(a for a in self.attempts if a.came is not None)
+        return tuple(a for a in self.attempts if a.measured is not None)
 
     @property
     def best(self) -> Attempt:
@@ -267,16 +267,16 @@ def run_regulation(
         whole = len(request.poles) + 1
         tell = part(progress, i / whole, (i + 1) / whole, f"regulating with {name}")
         tell("designing", 0.0)
-        foreseen = _foreseen(name, poles, rig, model, sampled, task, others, request, seed, workers, tell)
-        came = None if stand is None else _came(stand, foreseen, task, seed, folder)
-        attempts.append(replace(foreseen, came=came))
+        predicted = _predicted(name, poles, rig, model, sampled, task, others, request, seed, workers, tell)
+        measured = None if stand is None else _run_attempt(stand, predicted, task, seed, folder)
+        attempts.append(replace(predicted, measured=measured))
         if stopped():
             interrupted = True
             break
     result = Regulation(
         rig=rig, truth=stand.rig if stand is not None and stand.simulated else None, task=task, request=request,
         attempts=tuple(attempts), ways=(), uncertain=bool(rig.draws), source=source, seed=seed,
-        performed=SIMULATED if stand is None or not any(a.came for a in attempts) else stand.performed,
+        performed=SIMULATED if stand is None or not any(a.measured for a in attempts) else stand.performed,
         interrupted=interrupted,
     )  # fmt: skip
     progress("comparing the ways to the velocities", len(request.poles) / (len(request.poles) + 1))
@@ -297,7 +297,7 @@ def actual_start(task: Task, seed: int) -> Array:
     return task.starts(1, np.random.default_rng([seed, 54]))[0]
 
 
-def _foreseen(
+def _predicted(
     name: str, poles: Roots, rig: Rig, model: StateSpace, sampled: StateSpace, task: Task,
     others: Mapping[str, Array], request: RegulationRequest, seed: int, workers: Workers, progress: Progress,
 ) -> Attempt:  # fmt: skip
@@ -307,33 +307,33 @@ def _foreseen(
         rig, model, sampled, law, task, parameters=others, lanes=request.draws, seed=seed, workers=workers,
         progress=progress,
     )  # fmt: skip
-    return Attempt(name=name, placement=placed, law=law, before=predicted, came=None)
+    return Attempt(name=name, placement=placed, law=law, before=predicted, measured=None)
 
 
-def _came(stand: TestStand, foreseen: Attempt, task: Task, seed: int, folder: Path) -> Came | None:
+def _run_attempt(stand: TestStand, attempt: Attempt, task: Task, seed: int, folder: Path) -> MeasuredRun | None:
     """The law of an attempt on the rig; None where it is too likely that a live pendulum falls."""
-    share, basis = foreseen.before.share, foreseen.before.basis
+    share, basis = attempt.before.share, attempt.before.basis
     if not stand.simulated and share < AT_LEAST:
         return None
     driven, pendulum = stand.names
     stand.ask(
-        f"Next is {foreseen.name}, predicted probability of stabilisation "
+        f"Next is {attempt.name}, predicted probability of stabilisation "
         f"{basis.supported(in_percent(share))}. Let {pendulum} hang at "
         f"rest; after a small pulse bring it up with {driven} in the middle of its travel, hold both there until the "
         "loop takes them, and let go."
     )
     start = actual_start(task, seed)
-    return scored(stand.hold(foreseen.law, task.at, folder, _stem(foreseen), task.seconds, start=start))
+    return scored(stand.hold(attempt.law, task.at, folder, _stem(attempt), task.seconds, start=start))
 
 
-def scored(run: StandRun) -> Came:
+def scored(run: StandRun) -> MeasuredRun:
     """A run with its figures; one that a supervisor ended before anything could hit was lost there."""
     figures = score(run.trial)
     if run.ended:
         end = float(run.trial.t[-1])
         lost = {"ran_out": end} if run.overtravel else {"fell": end}
         figures = replace(figures, settled=math.inf, **lost)
-    return Came(trial=run.trial, score=figures, ended=run.ended)
+    return MeasuredRun(trial=run.trial, score=figures, ended=run.ended)
 
 
 def _ways(result: Regulation, model: StateSpace, sampled: StateSpace) -> list[VelocityRun]:

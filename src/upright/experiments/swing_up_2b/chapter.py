@@ -8,7 +8,7 @@ from typing import Any
 from upright.control.sensors import Scales
 from upright.control.swing_up import Ascent
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
-from upright.experiments.swing_up_2b.run import HELD, LIES, TILT, Lie, SwingUpRun
+from upright.experiments.swing_up_2b.run import FAULTS, HELD, TILT, FaultyEncoder, SwingUpRun
 from upright.laws import as_values
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
 from upright.report.symbols import number, percent
@@ -29,8 +29,8 @@ def chapter(result: SwingUpRun) -> Chapter:
     parts = [_sensor_part(result.model, result.check)]
     if result.ascent is not None:
         parts.append(_swing_part(result, result.ascent))
-    if result.lies:
-        parts.append(_lie_part(result))
+    if result.faulty:
+        parts.append(_faulty_part(result))
     page = Chapter(
         key="2b", title=f"Swing-up and catch: {result.truth.name}{seed}", question=QUESTION,
         verdict=result.verdict,
@@ -121,31 +121,31 @@ def _swing_part(result: SwingUpRun, run: Ascent) -> Part:
     )  # fmt: skip
 
 
-def _lie_part(result: SwingUpRun) -> Part:
+def _faulty_part(result: SwingUpRun) -> Part:
     """Faulty encoders, tried one by one."""
-    rows = tuple(_row(lie) for lie in result.lies)
-    caught = sum(lie.refused for lie in result.lies)
-    falling = [lie for lie in result.lies if math.isfinite(lie.fell)]
-    in_time = sum(lie.spoke < lie.fell for lie in falling)
+    rows = tuple(_row(fault) for fault in result.faulty)
+    caught = sum(fault.refused for fault in result.faulty)
+    falling = [fault for fault in result.faulty if math.isfinite(fault.fell)]
+    in_time = sum(fault.spoke < fault.fell for fault in falling)
     table = Table(
         caption="Encoders that show a multiple of what is true", rows=rows, numbers=(1, 2, 3, 4, 6),
         headings=("coordinate", "lie", "found hanging", "watch speaks [ms]", "at [°]", "and says", "fall [ms]"),
     )  # fmt: skip
     sentence = (
-        f"Hanging, {caught} of {len(result.lies)} lies are found before a loop is closed. "
+        f"Hanging, {caught} of {len(result.faulty)} lies are found before a loop is closed. "
         f"A loop started {math.degrees(TILT):.0f} degrees from upright falls with {len(falling)} of them; a watch "
         f"beside it switches off before the fall in {in_time} cases."
     )
     return Part("If an encoder were faulty", (Points((sentence,)), table))
 
 
-def _row(lie: Lie) -> tuple[str, ...]:
-    spoke = math.isfinite(lie.spoke)
+def _row(fault: FaultyEncoder) -> tuple[str, ...]:
+    spoke = math.isfinite(fault.spoke)
     return (
-        lie.name, f"{lie.factor:g}".replace("-", "−"), number(lie.estimate, 4),
-        f"{1e3 * lie.spoke:.0f}" if spoke else "–",
-        number(math.degrees(lie.tilt), 2) if spoke else "–", lie.suspicion or "–",
-        f"{1e3 * lie.fell:.0f}" if math.isfinite(lie.fell) else "stands",
+        fault.name, f"{fault.factor:g}".replace("-", "−"), number(fault.estimate, 4),
+        f"{1e3 * fault.spoke:.0f}" if spoke else "–",
+        number(math.degrees(fault.tilt), 2) if spoke else "–", fault.suspicion or "–",
+        f"{1e3 * fault.fell:.0f}" if math.isfinite(fault.fell) else "stands",
     )  # fmt: skip
 
 
@@ -198,6 +198,6 @@ def _numbers(result: SwingUpRun) -> dict[str, Any]:
             "K": law.K, "P": law.P, "size": law.size, "sure": law.sure, "reach": law.reach,
             "limit": law.limit, "travel": law.travel, "held_for": HELD, "body": vars(law.body),
         },
-        "lies": [vars(lie) for lie in result.lies],
-        "lies_tried": len(LIES) if result.lies else 0,
+        "lies": [vars(fault) for fault in result.faulty],
+        "lies_tried": len(FAULTS) if result.faulty else 0,
     }  # fmt: skip

@@ -37,12 +37,12 @@ TILT = math.radians(3)
 """From which a loop with a faulty encoder is switched on [rad]."""
 LEAST = math.radians(40)
 """Swing below which the period tells too little of the amplitude [rad]: at 40 degrees it is 3 % longer."""
-LIES = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("theta", 1.1), ("", -1.0), ("", 4.0))
+FAULTS = (("theta", -1.0), ("theta", 0.25), ("theta", 0.5), ("theta", 2.0), ("theta", 1.1), ("", -1.0), ("", 4.0))
 """Encoders tried: a coordinate, the driven one where it is empty, and what it shows over what is true."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lie:
+class FaultyEncoder:
     """What becomes of one faulty encoder.
 
     Attributes
@@ -108,7 +108,7 @@ class SwingUpRun:
     check: Scales
     law: SwingUp
     ascent: Ascent | None
-    lies: tuple[Lie, ...]
+    faulty: tuple[FaultyEncoder, ...]
     source: str
     folder: Path
     seconds: float = 0.0
@@ -271,16 +271,16 @@ def run_swing_up(
     check = scales(model, log, known)
     progress("swinging up", 0.4)
     ascent = _ascended(stand, law, folder, seconds) if check.sound else None
-    tried: tuple[Lie, ...] = ()
+    tried: tuple[FaultyEncoder, ...] = ()
     if stand.simulated and check.sound and not stopped():
         progress("trying encoders that lie", 0.6)
-        tried = _lies(model, stand.rig, law, command, known)
+        tried = _faulty_encoders(model, stand.rig, law, command, known)
     log.to_csv(folder / "sensors.csv")
     if ascent is not None:
         ascent.trial.record.to_csv(folder / "swing_up.csv")
     return SwingUpRun(
         model=model, truth=stand.rig if stand.simulated else model, log=log, check=check, law=law, ascent=ascent,
-        lies=tried,
+        faulty=tried,
         source=source, folder=folder, seconds=time.perf_counter() - began, performed=stand.performed,
     )  # fmt: skip
 
@@ -309,18 +309,18 @@ def _ask(stand: TestStand, what: str) -> None:
     stand.ask(f"Let {pendulum} hang at rest, with {driven} in the middle of its travel; {what}.")
 
 
-def _lies(
+def _faulty_encoders(
     model: Rig,
     truth: Rig,
     law: SwingUp,
     command: Array,
     known: Mapping[str, float] | None,
     seconds: float = 2.0,
-) -> tuple[Lie, ...]:
+) -> tuple[FaultyEncoder, ...]:
     names = [c.name for c in model.plant.coordinates]
     sampled = model.linear("inverted").to_sampled(model.period, (model.delay + model.lag) / model.period)
     law_upright = feedback(filtered(sampled, law.memory), law.K[None])
-    factors = [(name or names[0], factor) for name, factor in LIES]
+    factors = [(name or names[0], factor) for name, factor in FAULTS]
     checks: list[Scales] = []
     runs: list[tuple[Array, Array, Array]] = []
     for name, factor in factors:
@@ -331,12 +331,12 @@ def _lies(
         measured = np.column_stack([went.record[n] for n in names]) - rest
         runs.append((measured, went.u, np.abs(went.deviation[:, 1])))
     alarm = Watch(model).over(np.stack([r[0] for r in runs], axis=-1), np.column_stack([r[1] for r in runs]))
-    out: list[Lie] = []
+    out: list[FaultyEncoder] = []
     for i, (name, factor) in enumerate(factors):
         at, column, away = int(alarm.sample[i]), names.index(name), runs[i][2]
         beyond = np.flatnonzero(away > FALLEN)
         out.append(
-            Lie(
+            FaultyEncoder(
                 name=name, factor=factor, estimate=float(checks[i].value[column]), error=float(checks[i].error[column]),
                 refused=name in checks[i].wrong, spoke=at * model.period if at >= 0 else math.inf,
                 tilt=float(away[at]) if at >= 0 else 0.0,

@@ -282,7 +282,7 @@ def _why(result: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near
     if result.tried and not other_end.tried:
         end = f"was not tried; it is predicted that it {end}"
     guessed = [o.law.name for o in compared if result.tried and not o.tried]
-    foreseen = f" Predicted, not tried: {', '.join(guessed)}." if guessed else ""
+    predicted = f" Predicted, not tried: {', '.join(guessed)}." if guessed else ""
     tried = 0 if result.search is None else result.search.kp.size
     return Part(
         "Why state feedback",
@@ -304,7 +304,7 @@ def _why(result: Tracking, pd: Outcome, stiff: Outcome, other_end: Outcome, near
                 name="track-compared",
                 draw=lambda: steps_figure(result, compared, until=DWELL + 1.4, kick=None),
                 caption="The same step, then a steady push of the drive, which the command shown contains. A cross: "
-                "the rig has tripped." + foreseen,
+                "the rig has tripped." + predicted,
                 description=f"State feedback beside PD control: {_described(result)}",
             ),
             *_reasons(result, pd, stiff, bound),

@@ -16,6 +16,9 @@ from upright.identification.search.starts import regress, samples_of
 CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
 
+COARSE = 1e-3
+"""Relative step of what is left at which a convention's numbers are good enough to be distinguished from another's."""
+
 CLOSER = 0.98
 """Of two that explain nearly the same the one tried first stays; a mirror image of a free rig explains the same."""
 
@@ -59,4 +62,4 @@ def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
 
 def _unexplained(rig: GreyBox, runs: Sequence[Run], flips: Mapping[str, float], turns: Mapping[str, float]) -> float:
     samples = samples_of(rig, runs, most=2000, flips=flips, turns=turns)
-    return regress(rig, samples).unexplained if samples else math.inf
+    return regress(rig, samples, tolerance=COARSE).unexplained if samples else math.inf

@@ -90,21 +90,22 @@ def _factors(a: Assumption, name: str) -> tuple[float, float]:
     if math.isnan(power):  # not evaluated
         return 1.0, 1.0
     ends = [end / a.value if a.value else math.exp(end / a.size) if a.size else 1.0 for end in a.range]
-    factors = sorted(max(end, SMALL) ** power for end in ends)
-    return min(1.0, factors[0]), max(1.0, factors[-1])
+    most = -math.log(SMALL)  # what follows by a high power is anything
+    steps = [min(max(power * math.log(max(end, SMALL)), -most), most) for end in ends]
+    return math.exp(min(0.0, *steps)), math.exp(max(0.0, *steps))
 
 
-def _over_ranges(interval: tuple[float, float], name: str, found: Sequence[Assumption]) -> tuple[float, float]:
-    """An interval that holds what the ranges of all the assumed numbers in `found` make of it."""
-    for a in found:
+def _over_ranges(interval: tuple[float, float], name: str, rested: Sequence[Assumption]) -> tuple[float, float]:
+    """An interval that holds what the ranges of all the assumed numbers in `rested` make of it."""
+    for a in rested:
         ends = [end * factor if end else 0.0 for end, factor in product(interval, _factors(a, name))]
         interval = min(ends), max(ends)
     return interval
 
 
-def _ratios(a: Assumption, found: Sequence[Assumption], estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
+def _ratios(a: Assumption, rested: Sequence[Assumption], estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """Estimates that are proportional to an assumed number, per it; they hold what the other assumed ones may be."""
-    others = [b for b in found if b.name != a.name]
+    others = [b for b in rested if b.name != a.name]
     out: dict[str, Estimate] = {}
     for n in proportional(a):
         e = a.without.get(n, estimates[n])
@@ -171,11 +172,11 @@ def resting(a: Assumption) -> list[str]:
     return [n for n in a.follows if n not in free]
 
 
-def with_assumptions(estimates: Mapping[str, Estimate], found: Sequence[Assumption]) -> dict[str, Estimate]:
+def with_assumptions(estimates: Mapping[str, Estimate], rested: Sequence[Assumption]) -> dict[str, Estimate]:
     """The estimates, each with the assumed numbers that it rests on, as wide as their ranges make it."""
     out: dict[str, Estimate] = {}
     for n, e in estimates.items():
-        rests = [a for a in found if n in resting(a)]
+        rests = [a for a in rested if n in resting(a)]
         out[n] = e
         if rests:
             names = tuple(a.name for a in rests)
@@ -191,7 +192,7 @@ def _resting(e: Estimate, names: Sequence[str]) -> str:
 
 def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
     """What rests on which assumed number, and what would make it known."""
-    said: list[str] = []
+    sentences: list[str] = []
     for a in rested:
         along, free, moved = proportional(a), untouched(a), resting(a)
         unit = "" if a.unit in ("", "1") else f" {a.unit}"
@@ -216,8 +217,8 @@ def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
                 parts.append(f"{', '.join(a.redefines)} takes what it would explain into its own value")
             if free:
                 parts.append(f"{', '.join(free)} {'does' if len(free) == 1 else 'do'} not depend on it")
-        said.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
-    return tuple(said)
+        sentences.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))
+    return tuple(sentences)
 
 
 def remedy(a: Assumption) -> str:

@@ -115,17 +115,17 @@ def _percents(
     if not len(origins):
         return dict.fromkeys(range(s.y.shape[1]), -1000.0)
     recent = np.array([s.y[origins - i * s.stride] for i in range(order)])
-    measured, foreseen = (np.empty((steps, len(origins), s.y.shape[1])) for _ in range(2))
+    measured, predicted = (np.empty((steps, len(origins), s.y.shape[1])) for _ in range(2))
     with np.errstate(all="ignore"):  # an unstable equation runs away, and its score says so
         for j in range(steps):
             at = origins + j * s.stride
-            foreseen[j] = _past(s, at, order, recent) @ weights
+            predicted[j] = _past(s, at, order, recent) @ weights
             measured[j] = s.y[at + s.stride]
-            recent = np.concatenate([foreseen[j][None], recent[:-1]])
+            recent = np.concatenate([predicted[j][None], recent[:-1]])
     counted = (origins[None, :] + s.stride * np.arange(1, steps + 1)[:, None]) >= skip
     if exactly:
         counted[:-1] = False
     if not counted.any():
         return {}
     with np.errstate(all="ignore"):
-        return {k: fit_percent(measured[counted][:, k], foreseen[counted][:, k]) for k in range(s.y.shape[1])}
+        return {k: fit_percent(measured[counted][:, k], predicted[counted][:, k]) for k in range(s.y.shape[1])}

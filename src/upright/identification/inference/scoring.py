@@ -82,16 +82,16 @@ def _score_ahead(problem: Problem, index: int, x: Array, plan: FilterPlan, secon
     percents = {h: _percents(run, targets[i], y[i]) for i, h in enumerate(run.horizons)}
     near = problem.ahead(seconds)
     track = near.tracks[index]
-    foreseen, measured = near.simulate(index, x[:, None], 1)[0, ..., 0], track.targets(1)[0]
+    predicted, measured = near.simulate(index, x[:, None], 1)[0, ..., 0], track.targets(1)[0]
     position, speed = problem.filtered(index, x)
     samples = round(seconds / track.dt)
-    percents[seconds] = _percents(run, measured, foreseen)
+    percents[seconds] = _percents(run, measured, predicted)
     horizons = sorted(percents)
     allowed = ceilings(problem, index, x, [max(1, round(h / track.dt)) for h in horizons])
     limits = [{run.measured[k]: float(row[k]) for k in run.free} for row in allowed]
     return RunScore(
         role=run.role, fit_percent=percents[seconds], horizon=seconds, t=run.t[track.restarts + samples], y=measured,
-        simulated=foreseen, measured=run.measured,
+        simulated=predicted, measured=run.measured,
         naive=_percents(run, measured, position + speed * (track.dt * samples)),
         ahead={h: percents[h] for h in horizons},
         ceiling=dict(zip(horizons, limits, strict=True)),

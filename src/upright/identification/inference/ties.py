@@ -1,4 +1,4 @@
-"""Which pairs of numbers cannot be told apart: one takes what the other gives up, and only their sum is known.
+"""Which pairs of numbers cannot be separated: one takes what the other gives up, and only their sum is known.
 
 Two whose estimates are correlated at -0.99 explain the runs alike wherever one grows as the other shrinks: viscous and
 dry friction of a swing that always swings as far, a mass and the gain that drives it. Of all sums ``a + k b`` the one
@@ -41,13 +41,13 @@ class Tie:
 
     @property
     def sentence(self) -> str:
-        """That they cannot be told apart, and what is known."""
+        """That they cannot be separated, and what is known."""
         e = self.together
         digits = figures(e.value, e.stderr)
         value, low, high = (f"{v:.{digits}g}" for v in (e.value, *e.interval))
         sign, unit = "+" if self.factor > 0 else "-", "" if e.unit in ("", "1") else f" {e.unit}"
         return (
-            f"{self.first} and {self.second} cannot be told apart (correlation {self.correlation:.4g}); known is "
+            f"{self.first} and {self.second} cannot be separated (correlation {self.correlation:.4g}); known is "
             f"{self.first} {sign} {abs(self.factor):.3g} {self.second} = {value} ({low} to {high}){unit}, in SI units."
         )
 
@@ -74,13 +74,13 @@ def ties(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Tie, ...]:
     every = [*places, *others]
     off = pseudo_inverse(best.matrix[np.ix_(every, every)])[: len(places), : len(places)] * np.outer(slope, slope)
     R = np.where(moving, _correlation(C), np.where(np.outer(pinned, pinned), 0.0, _correlation(off)))
-    found: dict[tuple[int, int], float] = {}
+    pairs: dict[tuple[int, int], float] = {}
     for a in range(len(places)):
         b = int(np.argmax(np.abs(R[a])))
         if abs(R[a, b]) >= TIED:
-            found[min(a, b), max(a, b)] = float(R[a, b])
+            pairs[min(a, b), max(a, b)] = float(R[a, b])
     out: list[Tie] = []
-    for (a, b), rho in sorted(found.items(), key=lambda item: -abs(item[1])):
+    for (a, b), rho in sorted(pairs.items(), key=lambda item: -abs(item[1])):
         S = C if moving[a, b] else off
         factor = -math.copysign(math.sqrt(S[a, a] / S[b, b]), rho)
         value = float(values[places[a]] + factor * values[places[b]])
@@ -99,10 +99,10 @@ def _correlation(C: Array) -> Array:
     return R - np.diag(np.diag(R))
 
 
-def with_ties(estimates: Mapping[str, Estimate], found: Sequence[Tie]) -> dict[str, Estimate]:
+def with_ties(estimates: Mapping[str, Estimate], tied: Sequence[Tie]) -> dict[str, Estimate]:
     """The estimates; one that is tied to another and not narrow is determined only together with it."""
     out = dict(estimates)
-    for tie in reversed(found):
+    for tie in reversed(tied):
         for name, other in ((tie.first, tie.second), (tie.second, tie.first)):
             if matters(estimates[name]):
                 out[name] = replace(estimates[name], status=f"tied to {other}")

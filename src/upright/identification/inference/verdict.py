@@ -57,7 +57,7 @@ class Evidence:
     filter predicts, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
-    more than they vary, `ties` which pairs of numbers cannot be told apart.
+    more than they vary, `ties` which pairs of numbers cannot be separated.
     """
 
     rig: GreyBox
@@ -312,10 +312,10 @@ DETERMINED = ("well determined", "rests on", "tied to")
 """Beginnings of the statuses of numbers that the data determine: alone, per an assumed number, or with another."""
 
 
-def _ratios(found: Evidence) -> dict[str, Estimate]:
+def _ratios(evidence: Evidence) -> dict[str, Estimate]:
     """What is known per assumed number, of numbers that the data determine."""
     return {
-        name: e for a in found.assumptions for name, e in a.ratios.items()
+        name: e for a in evidence.assumptions for name, e in a.ratios.items()
         if e.status.startswith(DETERMINED) and e.half < 1
     }  # fmt: skip
 

@@ -24,6 +24,7 @@ from upright.closed_loop.structures import ClosedLoop, finer
 from upright.errors import BadInput
 from upright.identification.model.grey_box import NOISE, GreyBox, Parameter, base_values
 from upright.identification.model.runs import Run
+from upright.identification.problem.riccati import kalman_gains
 from upright.identification.problem.tracks import DRIFT, FilterPlan, Track, nearest_equilibrium
 from upright.laws import Law
 from upright.physics import Plant
@@ -136,9 +137,6 @@ def finely(held: Held, every: int) -> Held:
 STRETCH = 2
 """Warming-ups that a stretch lasts; warming up then costs half as much again."""
 
-SETTLED = 1e-6
-"""Relative change of the covariance per sample below which the gain counts as settled."""
-
 EASE = 0.05
 """Share of a coordinate's own forces with which the search for the random force begins."""
 
@@ -197,14 +195,17 @@ def restart_states(
     x = np.zeros((states + len(still), count, lanes))
     x[:states] = plan.equilibrium[:, None, None]
     x[columns] = measured[:, begin]
+    stepping = solver.stepping(table, x[:states].reshape(states, -1), track.u)
     place = np.full(last + 1, -1)
     place[track.restarts] = np.arange(track.restarts.size)
     out = np.full((len(x), track.restarts.size, lanes), np.nan)
-    with np.errstate(over="ignore", invalid="ignore"):  # a lane that runs away is told by its NaN
+    with np.errstate(over="ignore", invalid="ignore"):  # a lane that diverges shows by its NaN
         for j in range(1, steps):
-            table[drift] = still + x[states:].reshape(len(still), -1)
-            motion = solver.run(table, x[:states].reshape(states, -1), track.u, samples=2, start=start + (j - 1))
-            x[:states] = motion[1].reshape(states, count, lanes)
+            stepping.params[drift] = still + x[states:].reshape(len(still), -1)
+            stepping.state[:] = x[:states].reshape(states, -1)
+            stepping.start[:] = start + (j - 1)
+            stepping.go()
+            x[:states] = stepping.after.reshape(states, count, lanes)
             now = np.minimum(begin + j, last)
             innovation = measured[:, now]
             innovation -= x[columns]
@@ -227,29 +228,8 @@ def filtering(
     """As `gains`, and the covariance (lanes, S, S) of states and drifts of the inputs that they leave at the last."""
     Phi, Q = discrete_model(solver, track, values, lanes)
     plan = _plan(track)
-    n = Phi.shape[1]
-    C = np.zeros((len(track.columns), n))
-    C[np.arange(len(track.columns)), list(track.columns)] = 1.0
-    R = np.diag(plan.sensor)
-    P = np.zeros((lanes, n, n))
-    P[:, range(n), range(n)] = np.concatenate([plan.initial, plan.drift])
-    gains: list[Array] = [np.zeros((lanes, n, len(C)))]
-    for _ in range(1, steps):
-        ahead = Phi @ P @ Phi.transpose(0, 2, 1) + Q
-        PC = ahead @ C.T
-        try:
-            L: Array = np.linalg.solve(C @ PC + R, PC.transpose(0, 2, 1)).transpose(0, 2, 1).astype(np.float64)
-        except np.linalg.LinAlgError:
-            L = np.full_like(PC, np.nan)
-        keep = np.eye(n) - L @ C
-        new = keep @ ahead @ keep.transpose(0, 2, 1) + L @ R @ L.transpose(0, 2, 1)  # Joseph: stays positive
-        gains.append(L)
-        size = np.sqrt(np.maximum(np.einsum("lii->li", new), 0.0)) + 1e-300  # lanes of impossible numbers run away
-        same = not np.any(np.abs(new - P) > SETTLED * size[:, :, None] * size[:, None, :])
-        P = new
-        if same:
-            break
-    return [np.ascontiguousarray(L.transpose(2, 1, 0)) for L in gains], P
+    initial = np.concatenate([plan.initial, plan.drift])
+    return kalman_gains(Phi, Q, np.asarray(plan.sensor), list(track.columns), initial, steps)
 
 
 def discrete_model(

@@ -199,7 +199,7 @@ class Track:
     def errors(self, y: Array) -> Array:
         """Weighted errors (samples, W, outputs) of simulated outputs, of a free run from the first that counts on."""
         skip = min(self.first, len(y) - 1)
-        with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away is told by its NaN
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion that diverged shows by its NaN
             e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
         return e if self.retained is None else e * self.retained[skip : len(y), None, None]
 

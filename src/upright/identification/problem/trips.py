@@ -22,6 +22,24 @@ def find_trips(rig: GreyBox, run: Run) -> list[Trip]:
     return _moments(rig, run)[0]
 
 
+class Moments:
+    """What is known of when the input of a rig's runs really acted; every motion is looked at once.
+
+    A run with guesses, or with another label, is the same motion.
+    """
+
+    def __init__(self, rig: GreyBox) -> None:
+        self.rig = rig
+        self._observed: dict[tuple[int, int], tuple[Run, tuple[list[Trip], bool]]] = {}
+
+    def of(self, run: Run) -> tuple[list[Trip], bool]:
+        """Trips of a run, and whether the command plainly acts until its logged end."""
+        key = id(run.y), id(run.u)  # of a run that is kept here, so that no other takes its place
+        if key not in self._observed:
+            self._observed[key] = run, _moments(self.rig, run)
+        return self._observed[key][1]
+
+
 def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     """What `find_trips` says, and whether the command plainly acts until its logged end."""
     trips: list[Trip] = []
@@ -72,7 +90,7 @@ def trip_sentence(run: Run, trip: Trip) -> str:
     )
 
 
-def with_trip_guesses(rig: GreyBox, run: Run) -> Run:
+def with_trip_guesses(rig: GreyBox, run: Run, moments: Moments | None = None) -> Run:
     """The run with guesses of when its input really began and ended, for those of the two that are estimated.
 
     Where the motion plainly follows the command until its logged end, the guess is what the log says.
@@ -80,20 +98,21 @@ def with_trip_guesses(rig: GreyBox, run: Run) -> Run:
     wanted = [n for n in ("input_start", "input_end") if n in run.unknown and n not in run.guesses]
     if not wanted:
         return run
-    trips, plain = _moments(rig, run)
+    trips, plain = (moments or Moments(rig)).of(run)
     guesses = {"input_start" if trip.late else "input_end": trip.at for trip in trips}
     if plain:  # a sample inside: at the logged moment itself nothing changes with it
         guesses["input_end"] = run.period * float(np.flatnonzero(run.u[:, 0])[-1])
     return replace(run, guesses={**{n: guesses[n] for n in wanted if n in guesses}, **run.guesses})
 
 
-def unasked_trips(rig: GreyBox, runs: Sequence[Run]) -> list[str]:
+def unasked_trips(rig: GreyBox, runs: Sequence[Run], moments: Moments | None = None) -> list[str]:
     """Sentences on drives that went off or came on where the moment is not estimated."""
     if any(n in rig.estimated for n in ("actuator.start", "actuator.end")):
         return []
     sentences: list[str] = []
+    moments = moments or Moments(rig)
     for run in runs:
-        for trip in find_trips(rig, run):
+        for trip in moments.of(run)[0]:
             if ("input_start" if trip.late else "input_end") not in run.unknown:
                 sentences.append(trip_sentence(run, trip))
     return sentences

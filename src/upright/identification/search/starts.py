@@ -11,8 +11,9 @@ percent.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.problem.unknowns import Unknown, shared_unknowns
 from upright.identification.search.descent import descend
-from upright.physics.actuator import drive_force
+from upright.physics.actuator import ACTUATOR, drive_force
 from upright.physics.equations import evaluated, mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
@@ -55,6 +56,28 @@ class Sample:
     width: int
     edge: int
     period: float
+
+    @cached_property
+    def kept(self) -> slice:
+        """Samples away from the ends, whose polynomials are one-sided."""
+        edge = min(self.edge, self.q.shape[1] // 4)
+        return slice(edge, self.q.shape[1] - edge)
+
+    @cached_property
+    def measured(self) -> tuple[Array, Array]:
+        """Accelerations of the free coordinates that are kept, (free, T), and how much each scatters, (free, 1)."""
+        a = self.a[list(self.free)]
+        return a[:, self.kept], np.array([[scatter(row)] for row in a])
+
+    @cached_property
+    def force(self) -> Callable[[type[Plant], tuple[tuple[str, float], ...]], Array]:
+        """Force of every input (inputs, N) for a plant and its drive's numbers: slopes by others need none afresh."""
+
+        @lru_cache(maxsize=4)
+        def forced(plant: type[Plant], drive: tuple[tuple[str, float], ...]) -> Array:
+            return drive_force(plant, dict(drive), self.u, self.v, self.dt)
+
+        return forced
 
 
 def observe(rig: GreyBox, run: Run, *, flips: Mapping[str, float] | None = None,
@@ -115,9 +138,9 @@ def samples_of(
 def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample: Sample) -> Array:
     """Accelerations (free coordinates, N) of the model at the measured states, those of held coordinates given."""
     derived = plant.derived_for(values)
-    force = drive_force(plant, values, sample.u, sample.v, sample.dt)
+    force = sample.force(plant, tuple((n, values[n]) for n in ACTUATOR))
     states = {n: x for i, c in enumerate(derived.coordinates) for n, x in ((c, sample.q[i]), (f"{c}_dot", sample.v[i]))}
-    M, f = mass_and_force(derived, {**values, **states, **dict(zip(derived.inputs, force, strict=True))})
+    M, f = mass_and_force(derived, {**states, **values, **dict(zip(derived.inputs, force, strict=True))})
     n = f.shape[1]
     for joint in derived.joints:
         direction = np.array(joint.direction)
@@ -137,11 +160,8 @@ def model_accelerations(plant: type[Plant], values: Mapping[str, float], sample:
 def disagreement(rig: GreyBox, values: Mapping[str, float], sample: Sample) -> Array:
     """Weighted difference (free coordinates, T) between the model's accelerations and the measured ones."""
     a = model_accelerations(rig.plant, {**values, **sample.run.known}, sample)
-    smooth = _same_smoothing(a, sample.width)
-    edge = min(sample.edge, a.shape[1] // 4)
-    here = slice(edge, a.shape[1] - edge)
-    measured = sample.a[list(sample.free)]
-    return (smooth[:, here] - measured[:, here]) / np.array([[scatter(row)] for row in measured])
+    measured, size = sample.measured
+    return (_same_smoothing(a, sample.width)[:, sample.kept] - measured) / size
 
 
 def _same_smoothing(a: Array, width: int) -> Array:
@@ -159,11 +179,11 @@ class Agreement:
     unexplained: float
 
 
-def regress(rig: GreyBox, samples: list[Sample]) -> Agreement:
-    """Least squares on the accelerations over the numbers to estimate."""
+def regress(rig: GreyBox, samples: list[Sample], *, tolerance: float = 1e-5) -> Agreement:
+    """Least squares on the accelerations over the numbers to estimate, to a relative `tolerance` of their squares."""
     unknowns = [u for u in shared_unknowns(rig) if u.estimated]
     base = base_values(rig)
-    count = sum((s.q.shape[1] - 2 * min(s.edge, s.q.shape[1] // 4)) * len(s.free) for s in samples)
+    count = sum(s.measured[0].size for s in samples)
     x0 = np.array([_coordinate(u, base[u.name]) for u in unknowns])
     scale = np.array([u.scale for u in unknowns])
     log = np.array([u.log for u in unknowns], dtype=bool)
@@ -186,7 +206,7 @@ def regress(rig: GreyBox, samples: list[Sample]) -> Agreement:
         return Normal.by_differences(pulled, x, 1e-5 * np.where(log, 1.0, np.maximum(np.abs(x), scale)))
 
     lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
-    end = descend(normal, x0, lower, upper, tolerance=1e-5, limit=40)
+    end = descend(normal, x0, lower, upper, tolerance=tolerance, limit=40)
     r = residual(end.x)
     return Agreement(values=values(end.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
 

@@ -30,6 +30,8 @@ class BoardKind:
         Of an image: ``"hex"`` or ``"uf2"``.
     tools : mapping of str to str
         What builds an image, and Debian's package of each.
+    logic : str
+        Its supply for encoders, as its pins stand it.
     flasher : str
         Program that writes an image; empty where it is copied to the board's own drive.
     usb : tuple of tuple of int
@@ -41,6 +43,7 @@ class BoardKind:
     drives: tuple[str, ...]
     suffix: str
     tools: Mapping[str, str]
+    logic: str = "5 V"
     flasher: str = ""
     usb: tuple[int, ...] = ()
 
@@ -68,11 +71,16 @@ BOARDS: Mapping[str, BoardKind] = {
             tools={"make": "make", "avr-gcc": "gcc-avr avr-libc"}, flasher="avrdude",
             usb=(0x2341, 0x2A03, 0x1A86, 0x0403, 0x10C4),
         ),
+        BoardKind(
+            name="pico", title="Raspberry Pi Pico", drives=(PAIR, SIGN), suffix="uf2",
+            tools={"make": "make", "arm-none-eabi-gcc": "gcc-arm-none-eabi libnewlib-arm-none-eabi"},
+            logic="3V3", usb=(0x0403, 0x10C4, 0x1A86),
+        ),
     )
 }  # fmt: skip
 """By name."""
 
-_SAME = {"mega": "atmega2560", "mega2560": "atmega2560"}
+_SAME = {"mega": "atmega2560", "mega2560": "atmega2560", "rp2040": "pico"}
 _TOO_SMALL = ("uno", "nano", "leonardo", "micro", "atmega328p", "atmega32u4")
 
 
@@ -89,7 +97,7 @@ def board_of(name: str) -> BoardKind:
         raise BadInput(
             f"the firmware is not for an {name.capitalize()}: it has 2 kB of memory, and frames, limits and the law "
             "take 3 kB; two encoders, the host and 20 kHz PWM take timers and interrupts that it does not have. "
-            "Take an Arduino Mega 2560 (--board mega)."
+            "Take an Arduino Mega 2560 (--board mega) or a Raspberry Pi Pico (--board pico)."
         )
     word = _SAME.get(word, word)
     if word not in BOARDS:

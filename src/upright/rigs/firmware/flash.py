@@ -96,6 +96,8 @@ def flash(
     RigStopped
         When the person says no, the board does not answer within seconds, or what is on it is not what was written.
     """
+    if not board.flasher:
+        return _copied(board, image, port, hand, greet)
     if shutil.which(board.flasher) is None:
         raise BadInput(
             f"to write the image, {board.flasher} must be on this machine (sudo apt install {board.flasher})."
@@ -111,6 +113,43 @@ def flash(
     if written.returncode:
         raise RigStopped(f"The image was not written whole: {_last(written.stderr)} Flash again.")
     return Flashed(port=at, image=image, greeting=greet(at))
+
+
+def drives() -> list[Path]:
+    """Where drives of a board that waits for its image are mounted: `INFO_UF2.TXT` says what they are."""
+    home = Path.home().name
+    places = [
+        Path("/media") / home,
+        Path("/run/media") / home,
+        Path("/Volumes"),
+        *map(Path, ("D:/", "E:/", "F:/", "G:/")),
+    ]
+    return [folder for place in places for folder in (place, *_inside(place)) if (folder / "INFO_UF2.TXT").is_file()]
+
+
+def _inside(place: Path) -> list[Path]:
+    try:
+        return [*place.iterdir()] if place.is_dir() else []
+    except OSError:
+        return []
+
+
+def _copied(
+    board: BoardKind, image: Path, port: str, hand: Callable[[str], bool], greet: Callable[[str], str]
+) -> Flashed:
+    """An image onto the drive that a board shows while its button is held; the boot ROM checks each block."""
+    volumes = drives()
+    if len(volumes) != 1:
+        raise BadInput(
+            f"a {board.title} takes its image as a drive: hold BOOTSEL while you plug it in, and say it again; "
+            f"{len(volumes) or 'no'} such drives are there. Or copy {image} onto it yourself."
+        )
+    if not hand(
+        f"The {board.title} at {volumes[0]} gets {image.name}; what is on it is lost. Its motor's supply is off."
+    ):
+        raise RigStopped("Nothing was written.")
+    shutil.copyfile(image, volumes[0] / image.name)
+    return Flashed(port=port or str(volumes[0]), image=image, greeting=greet(port) if port else image.stem)
 
 
 def _last(text: str) -> str:

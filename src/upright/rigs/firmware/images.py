@@ -88,12 +88,12 @@ def build(board: BoardKind, drive: str, out: Path, ceilings: Mapping[str, int] |
         )
     flags = " ".join(f"-DCEILING_{k}={v}" for k, v in (ceilings or {}).items())
     with tempfile.TemporaryDirectory(prefix="upright-firmware-") as folder:
-        done = subprocess.run(
+        built = subprocess.run(
             ["make", "-s", "-C", str(sources()), f"B={folder}", f"CEILINGS={flags}", f"{folder}/{name}"],
             capture_output=True, encoding="utf-8", errors="replace", check=False,
         )  # fmt: skip
-        if done.returncode:
-            raise BadInput(f"the compiler refuses the firmware: {done.stderr.strip()[-500:]}")
+        if built.returncode:
+            raise BadInput(f"the compiler refuses the firmware: {built.stderr.strip()[-500:]}")
         return Image(
             path=replace_file(target, (Path(folder) / name).read_bytes()), ready=False, ceilings=dict(ceilings or {})
         )

@@ -51,12 +51,12 @@ def pins(board: BoardKind, drive: str) -> tuple[Pin, ...]:
             mine = when[1].lower() == drive
         elif line.startswith("#endif"):
             mine = True
-        elif mine and (found := _PIN.match(line)):
-            *port, number = (word.strip() for word in found[2].split(","))
+        elif mine and (match := _PIN.match(line)):
+            *port, number = (word.strip() for word in match[2].split(","))
             out.append(
                 Pin(
-                    number=int(number), name=f"P{port[0]}{port[1]}" if port else f"GP{number}", signal=found[1],
-                    device=found[3], terminal=found[4],
+                    number=int(number), name=f"P{port[0]}{port[1]}" if port else f"GP{number}", signal=match[1],
+                    device=match[3], terminal=match[4],
                 )
             )  # fmt: skip
     return tuple(out)

@@ -13,7 +13,7 @@ _ROW, _TOP, _GAP = 24, 70, 16
 _BOARD, _DEVICE = (24, 190), (420, 470)
 """Left edge and width of the board, and of what it is wired to."""
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
-"""Okabe and Ito's, told apart by the colour-blind too."""
+"""Okabe and Ito's, distinguishable by the colour-blind too."""
 
 
 def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
@@ -29,21 +29,21 @@ def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
     y, parts, lines = _TOP, list[str](), list[str]()
     for k, (device, group) in enumerate(groupby(wires, lambda pin: pin.device)):
         rows = [(f"{pin.number}", f"{pin.name}", pin.terminal) for pin in group] + [("GND", "", "ground")]
-        if device.startswith("host"):
-            rows.pop()  # by the cable
+        if rows[0][2].endswith("USB") or device.endswith("board"):
+            rows.pop()  # by the cable, or soldered
         if device.startswith("encoder"):
-            rows.append(("5 V", "", "supply, and 2.2 kΩ to A and to B where they are open collectors"))
+            rows.append((board.logic, "", "supply, and 2.2 kΩ to A and to B where they are open collectors"))
         top, colour = y, _COLOURS[k % len(_COLOURS)]
         y += _ROW
         for number, name, terminal in rows:
             middle = y + _ROW / 2
-            shade = {"GND": "#777777", "5 V": "#bb0000"}.get(number, colour)
+            shade = {"GND": "#777777", board.logic: "#bb0000"}.get(number, colour)
             lines.append(
                 f'<line x1="{sum(_BOARD)}" y1="{middle}" x2="{_DEVICE[0]}" y2="{middle}" stroke="{shade}" '
                 f'stroke-width="2"/>'
             )
             parts += [
-                _text(sum(_BOARD) - 8, middle, f"{number}  {name}" if name else number, anchor="end"),
+                _text(sum(_BOARD) - 8, middle, label(number, name), anchor="end"),
                 _text(_DEVICE[0] + 10, middle, terminal),
             ]
             y += _ROW
@@ -67,6 +67,11 @@ def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
         f'font-family="sans-serif">\n<rect width="{width}" height="{height}" fill="white"/>\n'
         + "\n".join(body) + "\n</svg>\n"
     )  # fmt: skip
+
+
+def label(number: str, name: str) -> str:
+    """A pin, as the board and the processor call it."""
+    return name if name == f"GP{number}" else f"{number}  {name}".strip()
 
 
 def _text(x: float, y: float, text: str, *, anchor: str = "start", weight: str = "normal", size: int = 13) -> str:

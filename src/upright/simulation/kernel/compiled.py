@@ -18,7 +18,7 @@ from upright.simulation.kernel.equations import acceleration, step, terms
 from upright.simulation.kernel.events import events, places
 from upright.simulation.kernel.flavour import Layout
 from upright.simulation.kernel.lanes import ROUNDING, RUN_ARGUMENTS, law_text, run_text
-from upright.simulation.lowering import cache as kept
+from upright.simulation.lowering import cache as stored_code
 from upright.simulation.lowering.gpu import threads
 from upright.simulation.lowering.module import Module, Platform
 from upright.simulation.lowering.operands import FLOAT, INT, ArrayOf, Type, Unsupported
@@ -37,6 +37,7 @@ RUN: tuple[Type, ...] = (
 )  # fmt: skip
 """Types of `lanes.RUN_ARGUMENTS`."""
 
+_ARRAYS = [isinstance(t, ArrayOf) for t in RUN]
 _WORDS = struct.Struct("=" + "".join("d" if t == FLOAT else "q" for t in RUN))
 
 EVENTS: tuple[Type, ...] = (ArrayOf(0), ArrayOf(0), INT, FLOAT)
@@ -62,7 +63,7 @@ def source(p: Layout) -> str:
 @cache
 def _version() -> str:
     """What the machine code depends on besides the text."""
-    return f"{kept.lowered_by()} {hashlib.sha256(Path(__file__).read_bytes()).hexdigest()}"
+    return f"{stored_code.lowered_by()} {hashlib.sha256(Path(__file__).read_bytes()).hexdigest()}"
 
 
 class Kernel:
@@ -122,7 +123,7 @@ class Kernel:
             self.compiled.append(name)
             return compiled()
 
-        return kept.code(kept.key(_version(), name, "strict" * self._strict, self.text), noted)
+        return stored_code.code(stored_code.key(_version(), name, "strict" * self._strict, self.text), noted)
 
 
 def _steps(address: int) -> Callable[..., None]:
@@ -132,7 +133,7 @@ def _steps(address: int) -> Callable[..., None]:
     function = machine.function(address)
 
     def run(*args: Any) -> None:
-        function(_WORDS.pack(*[id(a) if isinstance(t, ArrayOf) else a for t, a in zip(RUN, args, strict=True)]))
+        function(_WORDS.pack(*[id(a) if by_address else a for by_address, a in zip(_ARRAYS, args, strict=True)]))
 
     return run
 

@@ -238,11 +238,11 @@ def _rule(w: Writer) -> None:
         ),
     )
     args = ", ".join(f"({''.join(f'{name}, ' for name in group)})" for group in names)
-    w.add(f"_put, _kept = rule((START[_base + _i] + _k) * _dt, {args})")
+    w.add(f"_put, _memory = rule((START[_base + _i] + _k) * _dt, {args})")
     for j in range(p.nu):
         w.add(f"_c = rounded({{ff{j}}} + _put[{j}], _steps{j}, _step{j})")
         _put(w, j)
-    w.add(*(f"{{z{i}}} = _kept[{i}]" for i in range(rule.states)))
+    w.add(*(f"{{z{i}}} = _memory[{i}]" for i in range(rule.states)))
 
 
 def _law(w: Writer) -> None:

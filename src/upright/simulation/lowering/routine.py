@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.simulation.lowering import cache as kept
+from upright.simulation.lowering import cache as stored_code
 from upright.simulation.lowering.module import Module
 from upright.simulation.lowering.operands import FLOAT, INT, ArrayOf, Kind, Type
 
@@ -32,7 +32,7 @@ class Routine:
     def __init__(self, text: str, name: str, *args: Argument) -> None:
         from upright.simulation.lowering import machine
 
-        self._given = args  # whose places the words say
+        self._args = args  # whose places the words say
         self._words = b"".join(_word(x) for x in args)
         self._call = machine.function(_address(text, name, tuple(_type(x) for x in args)))
 
@@ -48,7 +48,9 @@ def _address(text: str, name: str, types: tuple[Type, ...]) -> int:
     def compiled() -> bytes:
         return machine.compiled(Module(text, 1).entry(name, types, machine.platform()))
 
-    return machine.address_of(kept.code(kept.key(kept.lowered_by(), name, repr(types), text), compiled), name)
+    return machine.address_of(
+        stored_code.code(stored_code.key(stored_code.lowered_by(), name, repr(types), text), compiled), name
+    )
 
 
 def _type(x: Argument) -> Type:

@@ -70,20 +70,20 @@ def compiled(text: str, entry: str, arguments: Mapping[str, Type], *, lanes: int
     """
     module = Module(text, lanes, together=True, strict=strict)
     symbol, _ = module.instance(entry, tuple(arguments.values()))
-    taken: list[str] = []
-    given: list[str] = []
+    parameters: list[str] = []
+    passed: list[str] = []
     lines: list[str] = []
     for k, t in enumerate(arguments.values()):
         number = t == FLOAT
         if isinstance(t, ArrayOf) or number:
-            taken.append(f"{llvm(t, 1)} %a{k}")
-            given.append(taken[-1])
+            parameters.append(f"{llvm(t, 1)} %a{k}")
+            passed.append(parameters[-1])
         for part in [] if number else [f"{k}.{axis}" for axis in range(t.axes)] if isinstance(t, ArrayOf) else [f"{k}"]:
-            taken.append(f"i32 %n{part}")
+            parameters.append(f"i32 %n{part}")
             lines.append(f"  %w{part} = sext i32 %n{part} to i64")
-            given.append(f"i64 %w{part}")
-    body = "\n".join([*lines, f"  call void @{symbol}({', '.join(given)})", "  ret void"])
-    last = f"define void @{EXPORT}({', '.join(taken)}) nounwind {{\n{body}\n}}\n"
+            passed.append(f"i64 %w{part}")
+    body = "\n".join([*lines, f"  call void @{symbol}({', '.join(passed)})", "  ret void"])
+    last = f"define void @{EXPORT}({', '.join(parameters)}) nounwind {{\n{body}\n}}\n"
     return linked(machine.wasm(module.whole(machine.page(), last)), EXPORT)
 
 

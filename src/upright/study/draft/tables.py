@@ -101,7 +101,7 @@ def sensor_table(
         table.key("resolution", {"value": f"{most:.3g} {c.guess}", "assumed": True}, why)
     where = "lay before the first command" if driven else "comes to rest"
     zero = zero if abs(zero) > 1e-9 * (c.high - c.low) else 0.0  # a motion that has died out ends in rounding
-    table.key("offset", zero, f"reading at which {name} is zero, here where it {where}")
+    table.key("offset", zero, f"reading at which {name} is zero, here where it {where}", digits=9)
     if mirrored:
         table.key("sign", -1, "it is thrown the other way than the plant's angle")
     else:

@@ -88,7 +88,10 @@ def chance(
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
-    K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
+    try:
+        K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise BadInput(f"chance takes gains, a number for each state, got {gains!r:.40}.") from None
     if K.shape != (1, len(model.states)):
         raise BadInput(f"gains for {known.name} need shape {(1, len(model.states))}, got {K.shape}.")
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -13,6 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.control.moving import live_page, live_part
 from upright.verbs.handover import called, rig_of
 from upright.verbs.linear.matrices import is_linear, linear_model, read_matrices
 from upright.verbs.options import DesignOptions, above_zero, as_typed, known_options, rig_entries
@@ -20,7 +23,11 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import Start, read_pole_list, read_start, si_if_given
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from upright.designing.run import Designed
+    from upright.report.page import Part
     from upright.rig import Rig
     from upright.systems import StateSpace
 
@@ -71,7 +78,8 @@ def design(
     at : str, optional
         Equilibrium; the last that the plant names when omitted.
     poles : str or sequence of complex
-        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``; proposed when neither these nor weights are given.
+        Poles [1/s], as in ``"-4.15+-1.63j, -16.9, -3.2"``, or ``"set 3"`` of Table 1 as in `regulate`; proposed when
+        neither these nor weights are given.
     lqr : str or sequence of float
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
     effort_weight : float, optional
@@ -110,7 +118,7 @@ def design(
     from upright.rig.completion import completed
 
     folder_at, on = folder_if_given(out, pdf), known_options(DesignOptions, on, "design")
-    requested, weights = _poles(poles), _numbers(lqr)
+    requested, weights = _pole_set(poles), _numbers(lqr)
     if requested is not None and weights is not None:
         raise BadInput('give either --poles "-4+-2j, -10, -3" or --lqr "1,0,1,0" (weights of the states), not both.')
     if (source is None) == (matrices is None):
@@ -149,11 +157,28 @@ def design(
     page = chapter(designed, source=name + as_typed(on), folder=typed(folder_at or Path()))
     files: list[Path] = []
     if folder_at is not None:
+        moves: tuple[Part, ...] = ()
+        if (on_rig := request.on) is not None and request.at == "inverted" and request.speed != "kalman":
+            how = {"seed": seed, "speed": request.speed, "memory": request.memory}
+            page_of: Any = partial(live_page, on_rig, on_rig, designed.continuous, **how)
+            moves = live_part(on_rig.name, lambda: page_of()[0])
         files = [
             write_json(folder_at / "design.json", page.numbers),
-            *write_page(page, folder_at / "design.html", pdf),
+            *write_page(replace(page, parts=(*page.parts, *moves)), folder_at / "design.html", pdf),
         ]
     return Answer(designed, page, files)
+
+
+def _pole_set(poles: str | Iterable[complex]) -> NDArray[np.complex128] | None:
+    """Poles that were asked for, those of a set of Table 1 by its name."""
+    name = re.fullmatch(r"\s*set\s*(\w+)\s*", poles, re.IGNORECASE) if isinstance(poles, str) else None
+    if name is None:
+        return _poles(poles)
+    from upright.experiments.regulation_2.run import SETS
+
+    if f"set {name[1]}" not in SETS:
+        raise BadInput(f"--poles \"set N\" takes 1 to {len(SETS)} of Table 1, got '{name[1]}'.")
+    return _poles(SETS[f"set {name[1]}"])
 
 
 def _sampling(model: StateSpace, period: float | str | None) -> float:

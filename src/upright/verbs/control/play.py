@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
-from upright.errors import BadInput
 from upright.files import keeps_its_inputs
-from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.control.moving import Played, played
 from upright.verbs.handover import rig_of
-from upright.verbs.options import HoldingOptions, known_options, rig_entries
-from upright.verbs.values import Start, read_start
-
-if TYPE_CHECKING:
-    from upright.control.score import Scores
-    from upright.records import Array
-    from upright.rig import Rig
-
-_DESIGN = ("limit", "period", "counts", "vendor", "memory")
+from upright.verbs.options import HoldingOptions
+from upright.verbs.values import Start
 
 
 @command(
     "Control",
     metavars={"fit": "FIT", "poles": "LIST", "start": "LIST", "out": "PAGE"},
-    helps={"fit": "fit.json, its folder, or a study (TOML)."},
+    helps={"fit": "fit.json, its folder, or a study (TOML).", "out": "The page."},
+    defaults={"out": "play.html"},
     more="""
     upright play out/fit.json -o play.html
     upright play out/fit.json --poles "-4.15+-1.63j, -16.9, -3.2" --limit "5 V"
@@ -36,9 +27,9 @@ _DESIGN = ("limit", "period", "counts", "vendor", "memory")
 @keeps_its_inputs
 def play(
     fit: Any, *, poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 3.0, draws: int = 200,
-    seed: int = 0, out: str | os.PathLike[str] = "play.html", **on: Unpack[HoldingOptions],
-) -> Answer[Scores]:  # fmt: skip
-    """Write a page in which the identified rig moves: push it, drag its poles, see which rigs of the fit it holds.
+    seed: int = 0, out: str | os.PathLike[str] | None = None, **on: Unpack[HoldingOptions],
+) -> Played:  # fmt: skip
+    """Make a page in which the identified rig moves: push it, drag its poles, see which rigs of the fit it holds.
 
     The rig is simulated in the page, with dry friction, delay, encoder counts and limit; no request leaves it. Beside
     it the rigs that the covariance of the fit allows run under the same law at every change.
@@ -58,121 +49,20 @@ def play(
         How many they are.
     seed : int
         Of their draw.
-    out : path
-        The page, a file ending in .html.
+    out : path, optional
+        Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
     **on
         Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
 
     Returns
     -------
-    Answer
-        Of the `Scores` of the rigs, as `chance` has them for the same draw.
+    Played
+        With the `Scores` of the rigs, as `chance` has them for the same draw; `page` is its mark-up.
 
     Raises
     ------
     BadInput
         When something of the rig is not known, or it cannot be drawn or compiled for a page.
     """
-    from upright.basis import SIMULATED
-    from upright.files import replace_file
-    from upright.report.page import Chapter, Step, resting_on
-    from upright.rig.completion import completed, doubts
-    from upright.verbs.control.design import design
-
-    path = Path(out)
-    if path.suffix != ".html":
-        raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
-    if not 0 < seconds <= 20:
-        raise BadInput(f"rigs in a page run more than 0 and at most 20 s, got {seconds:g} s.")
-    if not 1 <= draws <= 1000:
-        raise BadInput(f"a page holds 1 to 1000 rigs, got {draws}.")
-    on = known_options(HoldingOptions, on, "play")
-    if (on.get("speed") or "filtered") == "kalman":
-        raise BadInput("in a page velocities come from plain or filtered differences; leave speed out.")
     known = rig_of(fit, "play", seed=seed, draws=draws)
-    if (lacks := unplayable(known)) is not None:
-        raise BadInput(f"play needs {lacks}.")
-    rig = completed(known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="play")
-    wanted = {name: value for name, value in dict(on).items() if name in _DESIGN}
-    designed: Any = design
-    gains = designed(fit, at="inverted", poles=poles, **wanted).continuous
-    text, scored = live_page(
-        known, rig, gains, start=start, seconds=seconds, draws=draws, seed=seed,
-        speed=on.get("speed") or "filtered", memory=on.get("memory", 0.5),
-    )  # fmt: skip
-    held = int(scored.held.sum())
-    chapter = Chapter(
-        title=f"The {rig.name} in a page", verdict=_verdict(held, draws), sound=held > 0.95 * draws,
-        warnings=tuple(doubts(known, rig)),
-        steps=(Step("Open the page in a browser, push the pendulum, drag the poles."),),
-        numbers={"held": held, "draws": draws, "seed": seed, "page": str(path)},
-    )  # fmt: skip
-    return Answer(scored, resting_on(chapter, known.basis, SIMULATED), [replace_file(path, text.encode())])
-
-
-def unplayable(rig: Rig) -> str | None:
-    """What a rig lacks to move in a page; None where nothing is."""
-    if "inverted" not in rig.plant.equilibria or len(rig.plant.inputs) != 1:
-        return f"a rig with one drive and an inverted equilibrium, and {rig.name} is none"
-    if not rig.plant.outline(rig.plant, [0.0] * len(rig.plant.coordinates)):
-        return f"a plant that says how it is drawn; give {type(rig.plant).__name__} its outline(p, q)"
-    return None
-
-
-def live_page(
-    known: Rig, rig: Rig, K: Array, *, start: Start = "", seconds: float = 3.0, draws: int = 200, seed: int = 0,
-    speed: str = "filtered", memory: float = 0.5,
-) -> tuple[str, Scores]:  # fmt: skip
-    """The page of a rig under gains K, and what becomes of the rigs that its fit allows; options as for `play`."""
-    import numpy as np
-
-    from upright.control.preflight import Task
-    from upright.control.score import outcomes
-    from upright.designing.run import velocities
-    from upright.experiments.regulation_2.run import HAND, START
-    from upright.gains import feedback
-    from upright.live.page import page
-    from upright.live.twin import Loop, moving
-    from upright.rig.completion import doubts
-    from upright.rig.variation import allowed
-
-    model = rig.linear("inverted")
-    way = velocities(
-        model, model.to_sampled(rig.period, rig.delay / rig.period), speed, memory, rig.limit, rig.resolution
-    )  # fmt: skip
-    loop = Loop(estimator=way, K=K, law=feedback(way, K))
-    let_go = dict(zip(("theta", "theta_dot"), START, strict=True))
-    let_go |= read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
-    task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)
-    others = allowed(rig, draws, seed)
-    starts = task.starts(draws, np.random.default_rng([seed, 52]))
-    scored = outcomes(rig, loop.law, at="inverted", starts=starts, seconds=seconds, parameters=others)
-    held = int(scored.held.sum())
-    blind = () if known.draws else ("The fit has no covariance: only dry friction and the hand vary.",)
-    text = page(
-        moving(rig, loop, task, others=others, lanes=draws, seed=seed), rig.plant,
-        headline=known.basis.qualified(_verdict(held, draws)),
-        cautions=[c for c in (known.basis.first_line(), *blind, *doubts(known, rig)) if c],
-        share=f"{held} of {draws} rigs are stabilised for {seconds:g} s.", numbers=_numbers(rig),
-        start=f"{math.degrees(let_go['theta']):.3g}° at {let_go['theta_dot']:.2g} rad/s", seed=seed,
-    )  # fmt: skip
-    return text, scored
-
-
-def _verdict(held: int, draws: int) -> str:
-    return f"The law stabilises {held} of {draws} rigs that the fit allows."
-
-
-def _numbers(rig: Rig) -> list[tuple[str, str, str]]:
-    """Symbol, meaning with unit, value of what is known of a rig."""
-    from upright.quantities import quantities
-    from upright.report.symbols import number, symbol, unit
-
-    what, values = quantities(rig.plant), rig.plant.parameters()
-    return [
-        *((symbol(n), f"{what[n].meaning} [{unit(what[n].unit)}]", number(v)) for n, v in values.items() if v),
-        ("", f"gain of the drive [{unit(rig.plant.inputs[0].unit)} per {rig.unit}]", number(rig.gain)),
-        ("", f"limit of the drive [{rig.unit}]", number(rig.limit)),
-        ("", "servo period [ms]", number(1e3 * rig.period)),
-        *((symbol(c.name), "encoder counts", f"{n:g}") for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
-    ]
+    return played(known, poles=poles, start=start, seconds=seconds, draws=draws, seed=seed, out=out, **on)

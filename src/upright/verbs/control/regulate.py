@@ -100,9 +100,13 @@ def regulate(
     BadInput
         When the call contradicts itself or the fit, or poles cannot be placed.
     """
-    from upright.experiments.regulation_2.chapter import chapter
+    from upright.designing.chapter import chapter as design_chapter
+    from upright.experiments.regulation_2.chapter import chapter, design_of_best
     from upright.experiments.regulation_2.run import identify_make, run_regulation
     from upright.experiments.stand.twin import TwinStand
+    from upright.files import write_json
+    from upright.report.page import Step
+    from upright.report.symbols import typed
     from upright.rig.completion import completed, doubts, twin_of
     from upright.workers import Workers
 
@@ -131,6 +135,12 @@ def regulate(
     if source is not None:
         page = replace(page, warnings=(*page.warnings, *doubts(known, model, truth)))
     files = write_page(page, at / "report.html", pdf)
+    design = design_of_best(result)
+    if design is not None:
+        files.append(write_json(at / "design.json", design_chapter(design, source=name, folder=typed(at)).numbers))
+        onward = Step(f"Take the law of {result.best.name} to the computer that closes the loop.",
+                      f"upright export {typed(files[-1])} --to c")  # fmt: skip
+        page = replace(page, steps=(onward, *page.steps))
     numbers = {**page.numbers, "verdict": page.verdict, "report": str(files[0])}
     return Answer(result, replace(page, numbers=numbers), files)
 

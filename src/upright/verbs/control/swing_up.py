@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         "lie": 'An encoder shows a multiple of what is true: "theta=2".',
     },
     ranges={"seconds": (1.0, 120.0)},
-    wrong=lambda done: not done.value.sound,  # whatever its model is worth
+    wrong=lambda answer: not answer.value.sound,  # whatever its model is worth
     more="""
     upright swing-up --rig linear --seed 3
 
@@ -120,7 +120,7 @@ def swing_up(
         page = check_chapter(model, scales, log.name, name or "FIT.json")
         page = replace(page, warnings=(*page.warnings, *doubt))
         return Answer(scales, page, write_page(page, at / "encoders.html", pdf))
-    travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_lying(truth, lie))
+    travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_faulty(truth, lie))
     result = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
     page = chapter(result)
     page = replace(page, warnings=(*page.warnings, *doubt))
@@ -129,7 +129,7 @@ def swing_up(
     )
 
 
-def _lying(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
+def _faulty(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
     """The rig with one encoder that shows a multiple of what is true."""
     if isinstance(lie, str):
         lies = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]

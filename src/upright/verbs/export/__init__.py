@@ -68,6 +68,7 @@ def export(
     """
     from upright.exports.targets import TARGETS, LawTarget, RigTarget
 
+    to = str(to)
     if to not in TARGETS:
         raise BadInput(f"--to is one of {', '.join(TARGETS)}, got '{to}'; {nearest(to, TARGETS)}")
     target = TARGETS[to]

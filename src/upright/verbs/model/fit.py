@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from upright.rig import Rig
     from upright.study.load import Study
     from upright.study.stored_fit import StoredFit
+    from upright.verbs.control.moving import Played
 
 
 class FitAnswer(Answer["Fit"]):
@@ -78,6 +79,12 @@ class FitAnswer(Answer["Fit"]):
     def ratios(self) -> Mapping[str, Estimate]:
         """What is known of numbers that rest on assumed ones, per these: ``fit.ratios["b_2/m_p"]``."""
         return {n: e for a in self.value.assumptions for n, e in a.ratios.items()}
+
+    def play(self, **options: Any) -> Played:
+        """The identified rig, moving in a page; options as for `up.play`."""
+        from upright.verbs.control.moving import played
+
+        return played(self.fitted.rig(seed=options.get("seed", 0), draws=options.get("draws", 200)), **options)
 
     @property
     def parameters(self) -> Any:
@@ -213,11 +220,11 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | 
     from upright.report.page import Chapter, Part
 
     worst = min((v for s in runs.values() for v in s.fit_percent.values()), default=float("nan"))
-    kept = promise(runs, bands)
+    promised = promise(runs, bands)
     part = Part("How much of each signal is explained", (score_table(runs),))
     chapter = Chapter(
-        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {kept.sentence}", parts=(part,),
-        sound=kept.holds, warnings=tuple(sentence for s in runs.values() for sentence in s.beyond),
+        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {promised.sentence}",
+        parts=(part,), sound=promised.holds, warnings=tuple(sentence for s in runs.values() for sentence in s.beyond),
         numbers={
             label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside}
             for label, s in runs.items()

@@ -16,7 +16,7 @@ from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.options import known_options
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.values import pairs, paths, si
+from upright.verbs.values import pairs, path_of, paths, si
 
 if TYPE_CHECKING:
     from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
@@ -132,7 +132,7 @@ def frequency(
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
     limits = _band(options.get("low"), options.get("high"))
     files = [at / "frequency.csv"]
-    if logs := [Path(source) for source in paths(sources)]:
+    if logs := [path_of(source, "a log") for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given

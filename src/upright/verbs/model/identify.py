@@ -166,6 +166,7 @@ def identify(
     from upright.report.symbols import typed
     from upright.study.results import fit_content, write_fit
     from upright.study.windows import windows
+    from upright.verbs.control.moving import live_part
     from upright.verbs.pages import folder_if_given, write_page
     from upright.workers import Workers
 
@@ -206,14 +207,18 @@ def identify(
         crossed=crossed, study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
         folder=typed(folder) if folder is not None else "OUT", windows=windows(requested.runs),
     )  # fmt: skip
+    page = replace(page, numbers=fit_content(fit, requested, crossed))
+    answer = FitAnswer(fit, page, written, requested, crossed)
     if folder is not None and (report or pdf):
-        written += write_page(page, folder / "report.html", pdf)
-    return FitAnswer(fit, replace(page, numbers=fit_content(fit, requested, crossed)), written, requested, crossed)
+        moves = live_part(requested.title or "rig", lambda: answer.play().page)
+        written += write_page(replace(page, parts=(*page.parts, *moves)), folder / "report.html", pdf)
+    return FitAnswer(fit, page, written, requested, crossed)
 
 
 def requested_study(source: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
     """The study that was handed in, or the one that a log and what is known of it make."""
     from upright.physics import Plant, find
+    from upright.rig import Rig
     from upright.study.load import Study
 
     of_log = {name: value for name, value in options.items() if value is not None}
@@ -227,12 +232,16 @@ def requested_study(source: Any, plant: Any = None, *, data: str | Path | None =
         return read_study(Path(source), Path(), None if data is None else Path(data))
     if isinstance(plant, str):
         plant = find(plant)
-    if isinstance(plant, Plant):
-        raise BadInput(f"identify takes the class, up.{type(plant).__name__}, and what is known in known={{...}}.")
+    if isinstance(plant, Plant | Rig):
+        kind = type(plant.plant if isinstance(plant, Rig) else plant).__name__
+        raise BadInput(f"identify takes the class, up.{kind}, and what is known in known={{...}}.")
     if plant is not None and not (isinstance(plant, type) and issubclass(plant, Plant)):
         raise BadInput(f"identify takes a plant such as up.Pendulum, or its name, got {type(plant).__name__}.")
     from upright.study.draft.from_record import study_of_record
 
+    known: Any = options.get("known")
+    if known is not None and not isinstance(known, Mapping):
+        raise BadInput(f"known has numbers by name, such as {{'m_p': '223.5 g'}}, got {known!r:.40}.")
     log: Any = source
     return study_of_record(open_log(log)[0], plant, **options)
 

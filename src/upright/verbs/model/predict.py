@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 
     upright predict swing-fit/fit.json other_day.toml
 
-    Exit code: 0 predicted as well as the fit promises, 3 worse, 2 the model, the
-    study or a log is wrong.
+    upright predict swing-fit/fit.json other_day.csv
+
+    Exit code: 0 predicted as well as the fit promises, 3 worse, or only runs that
+    the fit has seen, 2 the model, the study or a log is wrong.
     """,
 )
 @keeps_its_inputs
@@ -95,18 +98,21 @@ def predict(
     rig = replace(requested.model, substeps=fitted.substeps)
     runs = [replace(run, role="predict") for run in requested.runs]
     scores = score(fitted.values, rig, runs, groups=fitted.groups, bands=fitted.bands)
-    kept = promise(scores, fitted.bands, fitted.scores)
+    promised = promise(scores, fitted.bands, fitted.scores)
+    fitted_runs = {run.label: label for run in runs if (label := fitted.fitted_run(run.source))}
+    verdict = f"{_fitted_note(fitted_runs, len(runs))}{promised.sentence}"
     names = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,
-        "verdict": kept.sentence,
-        "as_promised": kept.holds,
+        "verdict": verdict,
+        "as_promised": promised.holds,
+        "seen_in_the_fit": fitted_runs,
         "runs": {label: {name: getattr(s, name) for name in names} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
     page = Chapter(
-        title=f"{of} on {on}", verdict=kept.sentence, sound=kept.holds, numbers=numbers,
+        title=f"{of} on {on}", verdict=verdict, sound=promised.holds and len(fitted_runs) < len(runs), numbers=numbers,
         parts=(
             Part(
                 "How much of each signal is explained",
@@ -124,6 +130,15 @@ def predict(
     return Answer(
         scores, page, [write_json(at / "prediction.json", numbers), *write_page(page, at / "prediction.html", pdf)]
     )
+
+
+def _fitted_note(fitted_runs: Mapping[str, str], runs: int) -> str:
+    """What has to stand before the verdict where runs were fitted: how they are explained is no prediction."""
+    if not fitted_runs:
+        return ""
+    which = ", ".join(f"'{run}' (as '{label}')" if run != label else f"'{run}'" for run, label in fitted_runs.items())
+    what = "This is no prediction: the fit has seen" if len(fitted_runs) == runs else "The fit has seen"
+    return f"{what} {which}. "
 
 
 def _runs_to_predict(fitted: StoredFit, source: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:

@@ -1,0 +1,157 @@
+"""A rig in memory, moving in a page: what reports, fits and `play` share."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from upright.errors import BadInput, UprightError
+from upright.verbs.answer import Answer
+from upright.verbs.options import HoldingOptions, known_options, rig_entries
+from upright.verbs.values import Start, read_pole_list, read_start
+
+if TYPE_CHECKING:
+    from upright.control.score import Scores
+    from upright.records import Array
+    from upright.report.page import Chapter, Part
+    from upright.rig import Rig
+
+
+def played(
+    known: Rig, *, poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 3.0, draws: int = 200,
+    seed: int = 0, out: str | os.PathLike[str] | None = None, **options: Any,
+) -> Played:  # fmt: skip
+    """A rig that moves in a page; arguments, result and errors as for `play`."""
+    from upright.basis import SIMULATED
+    from upright.designing.proposal import design_unasked
+    from upright.designing.run import DesignRequest, design_for
+    from upright.files import replace_file
+    from upright.report.page import Chapter, Step, resting_on
+    from upright.rig.completion import completed, doubts
+
+    path = None if out is None else Path(out)
+    if path is not None and path.suffix != ".html":
+        raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
+    if not 0 < seconds <= 20:
+        raise BadInput(f"rigs in a page run more than 0 and at most 20 s, got {seconds:g} s.")
+    if not 1 <= draws <= 1000:
+        raise BadInput(f"a page holds 1 to 1000 rigs, got {draws}.")
+    on = known_options(HoldingOptions, options, "play")
+    if (on.get("speed") or "filtered") == "kalman":
+        raise BadInput("in a page velocities come from plain or filtered differences; leave speed out.")
+    if (lacks := unplayable(known)) is not None:
+        raise BadInput(f"play needs {lacks}.")
+    rig = completed(known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="play")
+    speed, memory = on.get("speed") or "filtered", on.get("memory", 0.5)
+    request = DesignRequest(
+        at="inverted", poles=read_pole_list(poles), period=rig.period, speed=speed, memory=memory,
+        resolution=tuple(rig.resolution.tolist()), limit=rig.saturation, on=rig,
+    )  # fmt: skip
+    gains = (design_unasked if request.poles is None else design_for)(known, request).continuous
+    text, scored = live_page(
+        known, rig, gains, start=start, seconds=seconds, draws=draws, seed=seed, speed=speed, memory=memory
+    )  # fmt: skip
+    held = int(scored.held.sum())
+    chapter = Chapter(
+        title=f"The {rig.name} in a page", verdict=_verdict(held, draws), sound=held > 0.95 * draws,
+        warnings=tuple(doubts(known, rig)),
+        steps=(Step("Open the page in a browser, push the pendulum, drag the poles."),),
+        numbers={"held": held, "draws": draws, "seed": seed} | ({} if path is None else {"page": str(path)}),
+    )  # fmt: skip
+    files = [] if path is None else [replace_file(path, text.encode())]
+    return Played(scored, resting_on(chapter, known.basis, SIMULATED), files, text)
+
+
+class Played(Answer["Scores"]):
+    """What becomes of the rigs, and the page in which one of them moves; a notebook shows the page."""
+
+    def __init__(self, scored: Scores, chapter: Chapter, files: Sequence[Path], page: str) -> None:
+        super().__init__(scored, chapter, files)
+        self.page = page
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f'<iframe sandbox="allow-scripts" width="100%" height="1180" srcdoc="{escape(self.page)}"></iframe>'
+
+
+def live_part(name: str, draw: Callable[[], str]) -> tuple[Part, ...]:
+    """The part of a report in which a rig moves; none where something is not known that it would take."""
+    from upright.report.page import Live, Part
+
+    try:
+        markup = draw()
+    except UprightError:
+        return ()
+    return (Part("Push it", (Live(markup=markup, description=f"The {name}, to be pushed"),), aside=True),)
+
+
+def unplayable(rig: Rig) -> str | None:
+    """What a rig lacks to move in a page; None where nothing is."""
+    if "inverted" not in rig.plant.equilibria or len(rig.plant.inputs) != 1:
+        return f"a rig with one drive and an inverted equilibrium, and {rig.name} is none"
+    if not rig.plant.outline(rig.plant, [0.0] * len(rig.plant.coordinates)):
+        return f"a plant that says how it is drawn; give {type(rig.plant).__name__} its outline(p, q)"
+    return None
+
+
+def live_page(
+    known: Rig, rig: Rig, K: Array, *, start: Start = "", seconds: float = 3.0, draws: int = 200, seed: int = 0,
+    speed: str = "filtered", memory: float = 0.5,
+) -> tuple[str, Scores]:  # fmt: skip
+    """The page of a rig under gains K, and what becomes of the rigs that its fit allows; options as for `play`."""
+    import numpy as np
+
+    from upright.control.preflight import Task
+    from upright.control.score import outcomes
+    from upright.designing.run import velocities
+    from upright.experiments.regulation_2.run import HAND, START
+    from upright.gains import feedback
+    from upright.live.page import page
+    from upright.live.twin import Loop, moving
+    from upright.rig.completion import doubts
+    from upright.rig.variation import allowed
+
+    model = rig.linear("inverted")
+    way = velocities(
+        model, model.to_sampled(rig.period, rig.delay / rig.period), speed, memory, rig.limit, rig.resolution
+    )  # fmt: skip
+    loop = Loop(estimator=way, K=K, law=feedback(way, K))
+    let_go = dict(zip(("theta", "theta_dot"), START, strict=True))
+    let_go |= read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
+    task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)
+    others = allowed(rig, draws, seed)
+    starts = task.starts(draws, np.random.default_rng([seed, 52]))
+    scored = outcomes(rig, loop.law, at="inverted", starts=starts, seconds=seconds, parameters=others)
+    held = int(scored.held.sum())
+    blind = () if known.draws else ("The fit has no covariance: only dry friction and the hand vary.",)
+    text = page(
+        moving(rig, loop, task, others=others, lanes=draws, seed=seed), rig.plant,
+        headline=known.basis.qualified(_verdict(held, draws)),
+        cautions=[c for c in (known.basis.first_line(), *blind, *doubts(known, rig)) if c],
+        share=f"{held} of {draws} rigs are stabilised for {seconds:g} s.", numbers=_numbers(rig),
+        start=f"{math.degrees(let_go['theta']):.3g}° at {let_go['theta_dot']:.2g} rad/s", seed=seed,
+    )  # fmt: skip
+    return text, scored
+
+
+def _verdict(held: int, draws: int) -> str:
+    return f"The law stabilises {held} of {draws} rigs that the fit allows."
+
+
+def _numbers(rig: Rig) -> list[tuple[str, str, str]]:
+    """Symbol, meaning with unit, value of what is known of a rig."""
+    from upright.quantities import quantities
+    from upright.report.symbols import number, symbol, unit
+
+    what, values = quantities(rig.plant), rig.plant.parameters()
+    return [
+        *((symbol(n), f"{what[n].meaning} [{unit(what[n].unit)}]", number(v)) for n, v in values.items() if v),
+        ("", f"gain of the drive [{unit(rig.plant.inputs[0].unit)} per {rig.unit}]", number(rig.gain)),
+        ("", f"limit of the drive [{rig.unit}]", number(rig.limit)),
+        ("", "servo period [ms]", number(1e3 * rig.period)),
+        *((symbol(c.name), "encoder counts", f"{n:g}") for c, n in zip(rig.plant.coordinates, rig.counts, strict=True)),
+    ]

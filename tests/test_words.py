@@ -1,0 +1,84 @@
+"""One term per thing: the words that docs/glossary.md replaced do not come back into the source."""
+
+from __future__ import annotations
+
+import io
+import re
+import tokenize
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+FILES = sorted((ROOT / "src/upright").rglob("*.py"))
+
+REPLACED = frozenset(
+    ["told", "wish", "wishes", "asked", "found", "said", "seen", "foreseen", "abreast", "shaken", "worn", "quantum"]
+)
+"""Words that name nothing: the name is the request, the estimate, the message, the prediction, ... that it is."""
+
+STANDING = {"quantum", "command_quantum", "WORN", "FileNotFoundError"}
+"""Former public names, which warn for one version, and Python's own; this set only shrinks."""
+
+ANYWHERE = re.compile(r"\b(told|wish(es|ed)?|abreast|shaken|quantum|foresees?)\b", re.IGNORECASE)
+"""Words that stand in no text either: docstrings, comments and messages."""
+QUOTED = {"laws/linear.py", "rig/rig.py"}
+"""Files that name a former option."""
+
+
+def words_of(name: str) -> set[str]:
+    """Words of an identifier, in lower case."""
+    return {w.lower() for w in re.split(r"_+|(?<=[a-z0-9])(?=[A-Z])", name)}
+
+
+def names_in(text: str) -> set[str]:
+    return {t.string for t in tokenize.generate_tokens(io.StringIO(text).readline) if t.type == tokenize.NAME}
+
+
+def replaced_names() -> dict[str, list[str]]:
+    """Identifiers with a replaced word, and the files where they stand."""
+    out: dict[str, list[str]] = {}
+    for path in FILES:
+        for name in names_in(path.read_text(encoding="utf-8")):
+            if words_of(name) & REPLACED:
+                out.setdefault(name, []).append(path.name)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("find_quantum", {"find", "quantum"}), ("FileNotFoundError", {"file", "not", "found", "error"})]
+)
+def test_an_identifier_is_read_word_by_word(name, words):
+    assert words_of(name) == words
+    assert names_in(f"x = '{name}'  # {name}\n{name} = 1\n") == {"x", name}
+
+
+def test_no_identifier_has_a_word_that_was_replaced():
+    assert {n: where for n, where in replaced_names().items() if n not in STANDING} == {}
+
+
+def test_a_name_that_is_gone_leaves_the_list_of_those_that_may_stand():
+    assert replaced_names().keys() >= STANDING
+
+
+def test_no_text_has_a_word_that_was_replaced():
+    lines = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in FILES
+        if path.relative_to(ROOT / "src/upright").as_posix() not in QUOTED
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if ANYWHERE.search(line)
+    ]
+    assert lines == []
+
+
+def test_a_word_is_defined_once_and_none_by_the_words_that_it_replaced():
+    rows = [
+        line.split("|")[1:3]
+        for line in (ROOT / "docs/glossary.md").read_text(encoding="utf-8").splitlines()
+        if line.startswith("| ")
+    ]
+    terms = [term.strip() for cell, _ in rows for term in cell.split(",") if cell.strip() != "term"]
+    assert len(terms) == len(set(terms)) > 40
+    assert all(meaning.strip().endswith(".") for cell, meaning in rows if cell.strip() != "term")
+    assert not [meaning for _, meaning in rows if ANYWHERE.search(meaning)]
