@@ -122,11 +122,11 @@ def _let_go(start: Start | float, rig: Path) -> float:
     from upright.running.rig import described
 
     model, _ = described(read_rig_file(rig))
-    found = read_start(start, model.states, model.state_units)
+    start_state = read_start(start, model.states, model.state_units)
     last = model.states[-2]
-    if any(value for name, value in found.items() if name != last):
+    if any(value for name, value in start_state.items() if name != last):
         raise BadInput(f'the hand of a twin lets go of {last} at rest; --start takes its deviation, such as "5 deg".')
-    return found.get(last, 0.0)
+    return start_state.get(last, 0.0)
 
 
 @command(
