@@ -29,7 +29,7 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
     "workers", "long", "gpu", "crash", "safety", "false_stops", "minute", "soak", "jitter", "gym", "at_hand",
-    "first", "kept", "strangers", "mutants",
+    "first", "kept", "strangers", "live", "mutants",
 )  # fmt: skip
 APART = ("mutants",)
 """Those that run when they are named, and never among all: what is asked there is not how fast."""

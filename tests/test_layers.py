@@ -228,6 +228,17 @@ def test_no_two_types_share_a_name():
     assert {name: where for name, where in homes.items() if len(where) > 1} == {}
 
 
+def test_few_functions_share_a_name():
+    """Verbs are called as their engines, plug-ins as their protocol says; the house asks for 20 at most."""
+    homes: dict[str, list[str]] = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(module_name(path))
+    shared = {name: where for name, where in homes.items() if len(where) > 1}
+    assert len(shared) <= 20, shared
+
+
 def test_no_file_is_called_after_a_drawer():
     drawers = {"utils", "util", "misc", "manager", "helpers"}
     assert [module_name(p) for p in SOURCE.rglob("*") if p.stem in drawers] == []

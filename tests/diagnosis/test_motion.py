@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.cases import case
-from upright.diagnosis.motion import SmoothedMotion, driven_row, motion_of, quiet_width, terms
+from upright.diagnosis.motion import SmoothedMotion, driven_row, motion_of, quiet_width, sign_terms
 from upright.physics import CartPendulum, Furuta, Pendulum, Plant, find
 from upright.simulation import simulate
 
@@ -92,7 +92,7 @@ def moved(rig: Rig) -> SmoothedMotion:
 
 @pytest.mark.parametrize("name", RIGS)
 def test_slopes_are_those_of_the_equations_of_motion(name: str) -> None:
-    found = {term.who: term for term in terms(moved(RIGS[name]))}
+    found = {term.who: term for term in sign_terms(moved(RIGS[name]))}
     assert {who: t.slope for who, t in found.items()} == pytest.approx(RIGS[name].slopes, rel=0.01)
     for term in found.values():
         assert term.total < 1e-4  # nothing of the acceleration is left
@@ -117,7 +117,7 @@ def test_the_driven_row_leaves_the_effort_over_the_inertia(name: str) -> None:
 def test_dry_friction_leaves_the_slopes_as_they_are() -> None:
     rig = RIGS["pendulum"]
     dry = replace(rig, plant=Pendulum(**ROD, b_2c=0.03))
-    found = {term.who: term for term in terms(moved(dry))}
+    found = {term.who: term for term in sign_terms(moved(dry))}
     assert {who: t.slope for who, t in found.items()} == pytest.approx(rig.slopes, rel=0.02)
     # b_2c/J_A is a tenth of the acceleration, of whose variance 1 % would be left; what is left are its switches
     assert all(t.total < 1e-3 for t in found.values())
@@ -127,9 +127,9 @@ def test_an_unmoved_body_has_no_row_and_throws_nobody() -> None:
     motion = moved(RIGS["cart-pendulum"])
     assert driven_row(replace(motion, rows=(1,)), np.ones(motion.t.size, bool)) == []
     # a cart that was not measured may have been thrown about: what it did is no term
-    assert {term.who for term in terms(replace(motion, rows=(1,)))} == {("theta", "theta")}
+    assert {term.who for term in sign_terms(replace(motion, rows=(1,)))} == {("theta", "theta")}
     still = replace(motion, u=0 * motion.u)
-    assert ("effort", "x") not in {term.who for term in terms(still)}
+    assert ("effort", "x") not in {term.who for term in sign_terms(still)}
 
 
 def test_a_body_slides_where_it_is_fast_or_speeds_up() -> None:

@@ -125,7 +125,7 @@ def test_functions_of_the_c_library_are_named():
 
 
 def made(text):
-    platform = machine.page()
+    platform = machine.page_platform()
     head = f'target triple = "{platform.triple}"\ntarget datalayout = "{platform.layout}"\n'
     return machine.wasm(head + text)
 

@@ -27,7 +27,7 @@ def run(tmp_path, monkeypatch):
     def go(path=tmp_path / "run.mcap"):
         line = json.dumps(HEADER.as_metadata()).encode() + b"\n"
         monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(line)))
-        process.main(str(path), name, 1024)
+        process.write_log(str(path), name, 1024)
         return path
 
     yield SimpleNamespace(ring=ring, go=go)

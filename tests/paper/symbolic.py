@@ -5,7 +5,7 @@ from typing import Any
 
 import sympy as sp
 
-from upright.physics.lagrange import mass_and_force, symbols
+from upright.physics.lagrange import symbolic_mass_and_force, symbols
 from upright.physics.plant import Plant
 
 
@@ -18,7 +18,7 @@ def linear(cls: type[Plant], at: str, *, without: Collection[str] = ()) -> tuple
 def over_determinant(cls: type[Plant], at: str, *, without: Collection[str] = ()) -> tuple[Any, Any, Any]:
     """Determinant of the mass matrix (the paper's D_2), and A, B multiplied by it, about a named equilibrium."""
     _, q, v, u = symbols(cls)
-    M, f = mass_and_force(cls, without=without)
+    M, f = symbolic_mass_and_force(cls, without=without)
     point = {qi: sp.nsimplify(cls.equilibria[at].get(qi.name, 0), [sp.pi]) for qi in q}
     rest = {**dict.fromkeys(v, 0), **dict.fromkeys(u, 0), **point}
     mass = M.subs(point)

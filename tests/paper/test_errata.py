@@ -11,7 +11,7 @@ from tests.paper import printed
 from tests.paper.printed import J_A, p, s
 from tests.paper.symbolic import linear, over_determinant
 from upright.physics import Furuta
-from upright.physics.lagrange import mass_and_force
+from upright.physics.lagrange import symbolic_mass_and_force
 
 # The paper's linear models know no axial inertia and no anchoring spring.
 PAPERS_RIG = {p.J_a: 0, sp.Symbol("k_psi", real=True): 0}
@@ -83,7 +83,7 @@ def test_erratum_2_units():
 
 
 def test_erratum_3_the_cosine_goes_with_the_axial_inertia():
-    M, f = mass_and_force(Furuta, without=Furuta.optional)
+    M, f = symbolic_mass_and_force(Furuta, without=Furuta.optional)
     f = f.subs({sp.Symbol("T", real=True): 0, sp.Symbol("k_psi", real=True): 0})  # eq. (3) is a free response
     as_printed = {p.J_zz: p.J_p, p.J_xx: p.J_p}  # "both equal the previously defined J_p"
     right = {p.J_zz: p.J_p, p.J_xx: p.J_a}
@@ -97,7 +97,7 @@ def test_erratum_3_a_hanging_rod_of_no_thickness_turns_like_a_point():
     """Its mass sits on one vertical line at distance r: inertia m_p r^2 about the axis, and nothing more."""
     hanging_thin_rod = {p.theta: 0, p.J_a: 0}
     about_axis = p.J_d + p.m_p * p.r**2
-    assert zero(mass_and_force(Furuta)[0][0, 0].subs(hanging_thin_rod) - about_axis)
+    assert zero(symbolic_mass_and_force(Furuta)[0][0, 0].subs(hanging_thin_rod) - about_axis)
     assert not zero(printed.mass_3()[0, 0].subs({p.J_xx: p.J_p, **hanging_thin_rod}) - about_axis)
 
 

@@ -15,7 +15,7 @@ from upright.physics import Plant, find, lagrange
 from upright.physics.generate import variants
 from upright.physics.lagrange import derive
 from upright.physics.plant import stem
-from upright.physics.stored import FOLDER, text_of
+from upright.physics.stored import FOLDER, file_text
 
 MOTOR = find("qube_motor.py:QubeMotor", EXAMPLES)(
     m_p=0.024, l_cg=0.0645, r=0.085, J_d=2.3e-4, J_p=3.3e-5, b_1=5e-4, b_2=1e-5
@@ -79,7 +79,7 @@ def test_energy_grows_by_the_work_done_and_falls_by_the_heat(name, rng):
 def test_accelerations_are_those_of_an_unabridged_derivation(name, rng):
     """Lumps, named sines and common steps change nothing: SymPy's own Lagrange equations, evaluated plainly."""
     plant = PLANTS[name]
-    M, f = lagrange.mass_and_force(type(plant))
+    M, f = lagrange.symbolic_mass_and_force(type(plant))
     _, q, v, u = lagrange.symbols(type(plant))
     values = {sp.Symbol(k, real=True): value for k, value in plant.parameters().items()}
     plain = sp.lambdify([q, v, u], [M.subs(values), f.subs(values)])
@@ -95,7 +95,7 @@ def test_accelerations_are_those_of_an_unabridged_derivation(name, rng):
 def test_generated_equations_are_those_of_the_energies(plant, without):
     """If this fails: python -m upright.physics.generate."""
     path = FOLDER / f"{stem(plant, without)}.json"
-    assert path.read_text(encoding="utf-8") == text_of(derive(plant, without=without))
+    assert path.read_text(encoding="utf-8") == file_text(derive(plant, without=without))
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ from upright.rigs import Fault
 from upright.rigs.rigfile import read_rig_file
 from upright.running import run as run_module
 from upright.running.chapter import run_chapter
-from upright.running.rig import described, open_loop, read_law, stage_of
+from upright.running.rig import excitation_law, model_and_truth, read_law, stage_of
 from upright.running.run import RunRequest, fresh, run_rig
 
 RIG = make_rig("furuta")
@@ -175,7 +175,7 @@ def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
 
 def test_a_run_that_ended_well_leaves_no_fault_in_the_rig(folder, tmp_path):
     stage = stage_of(folder / "RIG.toml", balance=False)
-    law = open_loop([0.0], 2, RIG.period)
+    law = excitation_law([0.0], 2, RIG.period)
     order = RunOrder(make=lambda: stage, law=as_values(law), seconds=0.1, log=tmp_path / "run.mcap", check=False)
     assert not carry_out(order, law=law).stopped
     assert stage.supervisor.rig.sample.faults == Fault(0)
@@ -250,7 +250,7 @@ def test_a_signal_on_a_real_rig_rests_on_no_model_and_a_law_on_that_of_its_desig
     monkeypatch.setattr(run_module, "run_in_process", beside)
     blind = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.05, check=False)
     held = replace(blind, excite="", law=folder / "design.json")
-    model = described(read_rig_file(folder / "RIG.toml"))[0].basis
+    model = model_and_truth(read_rig_file(folder / "RIG.toml"))[0].basis
     assert run_rig(replace(blind, own_process=True), tmp_path).basis == model  # a twin is one
     assert paces == [False]
     real = replace(read_rig_file(folder / "RIG.toml"), performed="")

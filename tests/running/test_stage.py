@@ -14,7 +14,7 @@ from upright.basis import SIMULATED
 from upright.laws import Law
 from upright.rig.makes import make_rig
 from upright.rigs.rigfile import read_rig_file
-from upright.running.rig import described, stage_of, usual_limits
+from upright.running.rig import model_and_truth, stage_of, usual_limits
 from upright.running.run import _references
 
 LIMIT = "\n[actuator]\nlimit = 0.6\n"
@@ -64,13 +64,13 @@ def test_a_described_rig_has_a_twin_of_its_own_numbers_or_of_others_by_a_seed(tm
     (tmp_path / "rig.toml").write_text(STUDY + LIMIT, encoding="utf-8")
     file = read_rig_file(rig_file(tmp_path, f'study = "rig.toml"\nvendor = "ECP 205"\nseed = {seed}\n'))
     assert file.performed == SIMULATED
-    model, truth = described(file)
+    model, truth = model_and_truth(file)
     assert (truth == model) == (seed == 0)
     if seed:  # of the vendor's make, as many of which can be drawn as one likes
         assert truth == make_rig("furuta", seed)
-    real, same = described(replace(file, performed=""))  # a rig itself is not drawn
+    real, same = model_and_truth(replace(file, performed=""))  # a rig itself is not drawn
     assert same == real
-    named, _ = described(replace(file, name="bench 3"))
+    named, _ = model_and_truth(replace(file, name="bench 3"))
     assert named.name == "bench 3"
 
 

@@ -94,14 +94,14 @@ def quiet(rms: ArrayLike, peak: ArrayLike) -> NDArray[np.bool_]:
     return (np.asarray(rms) <= QUIET_RMS) & (np.asarray(peak) <= QUIET_PEAK)
 
 
-def resting(samples: Array) -> Array:
+def rest_samples(samples: Array) -> Array:
     """Samples of the rest, the last on the first axis."""
     return samples[-max(2, round(RESTING * len(samples))) :]
 
 
 def busyness(u: Array, limit: ArrayLike) -> tuple[Array, Array]:
     """Rms about the mean and peak of commands at rest, as shares of the limit; u of shape (N,) or (N, lanes)."""
-    still = resting(u)
+    still = rest_samples(u)
     return still.std(axis=0) / np.asarray(limit), np.abs(still).max(axis=0) / np.asarray(limit)
 
 
@@ -130,10 +130,10 @@ def rest_effort(t: Array, u: Array, limit: float, *, body: Array | None = None, 
             f"commands, {t.size} times and a limit of {limit:g}."
         )
     rms, peak = busyness(u, limit)
-    clock = resting(t)
+    clock = rest_samples(t)
     return RestEffort(
-        rms=float(rms), peak=float(peak), command=cycle(clock, resting(u)),
-        body=None if body is None else cycle(clock, resting(body), count),
+        rms=float(rms), peak=float(peak), command=cycle(clock, rest_samples(u)),
+        body=None if body is None else cycle(clock, rest_samples(body), count),
     )  # fmt: skip
 
 

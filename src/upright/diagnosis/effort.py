@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from upright.diagnosis.case import Case, column_unit
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.diagnosis.forces import ForceBalance
-from upright.diagnosis.motion import SmoothedMotion, chosen, driven_row
+from upright.diagnosis.motion import SmoothedMotion, driven_row, simplest
 from upright.diagnosis.sensors import clipped
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT
 from upright.records import Array
@@ -250,7 +250,7 @@ def push_of(motion: SmoothedMotion, balance: ForceBalance | None) -> Push | None
         for y, others in explained
     ]
     ends = [table.search(first, last, forward=False) for table in tables]
-    best = chosen([min(costs.values()) for _, costs in ends])
+    best = simplest([min(costs.values()) for _, costs in ends])
     table, (end, costs) = tables[best], ends[best]
     early = table.before(end)
     late = table.whole - early

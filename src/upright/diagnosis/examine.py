@@ -11,7 +11,7 @@ from upright.diagnosis.clock import examine_clock
 from upright.diagnosis.effort import examine_effort, examine_push, examine_settings, examine_uselessness, push_of
 from upright.diagnosis.findings import KINDS, SEVERITIES, Diagnosis, Finding
 from upright.diagnosis.forces import ForceBalance, against_form, against_gain, against_numbers, friction_of, values_of
-from upright.diagnosis.motion import SmoothedMotion, motion_of, terms
+from upright.diagnosis.motion import SmoothedMotion, motion_of, sign_terms
 from upright.diagnosis.rest import examine_rest
 from upright.diagnosis.sensors import examine_sensors
 from upright.physics import Plant, name_of
@@ -122,7 +122,7 @@ def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[st
         motion = replace(motion, u=np.where(motion.t < push.end, motion.u, 0.0))
         conventions = against_numbers(case, ForceBalance(motion, *numbers)) if not isinstance(numbers, str) else []
     if balance is None:
-        signed = [x for x in terms(motion) if not (faulty and x.who[0] == "effort")]
+        signed = [x for x in sign_terms(motion) if not (faulty and x.who[0] == "effort")]
         conventions = against_form(case, motion, signed)
         if not signed:
             reasons["sign"] = "the record holds no motion whose sign is known"

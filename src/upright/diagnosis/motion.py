@@ -180,12 +180,12 @@ class Row:
         return float(rest @ rest) / (float(self.target @ self.target) or 1.0)
 
 
-def chosen(left: Sequence[float]) -> int:
+def simplest(left: Sequence[float]) -> int:
     """Which of a plain and a whole form to take that leave these shares."""
     return len(left) - 1 if left[0] > PLAIN and left[-1] < FEWER * left[0] else 0
 
 
-def terms(motion: SmoothedMotion) -> list[Term]:
+def sign_terms(motion: SmoothedMotion) -> list[Term]:
     """Terms with a known sign."""
     return [term for i in motion.rows for term in _row_terms(motion, i)]
 
@@ -204,7 +204,7 @@ def driven_row(motion: SmoothedMotion, here: NDArray[np.bool_]) -> list[tuple[Ar
 def _row(motion: SmoothedMotion, i: int) -> Row | None:
     """Equation of one body, in its plain form unless the whole one explains far more; where the body slides."""
     forms = [row.at(motion.slides(i)) for row in _forms(motion, i)]
-    return forms[chosen([form.left for form in forms])] if forms else None
+    return forms[simplest([form.left for form in forms])] if forms else None
 
 
 def _forms(motion: SmoothedMotion, i: int) -> list[Row]:

@@ -23,6 +23,7 @@ from upright.identification.inference.covariance import Identifiability, Optimum
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
+from upright.identification.inference.neglected import neglected, with_force
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.ties import ties, with_ties
@@ -61,6 +62,9 @@ METHODS = ("auto", "least-squares", "simplex")
 """`auto`: closed-form starts, friction ladder, growing least squares, simplex where it stalls. `least-squares`: from
 the guess over a growing horizon. `simplex`: the paper's, then polished by least squares."""
 
+
+FIXED = ("unseen", "known")
+"""Statuses of numbers that no other model widens."""
 
 LOWER = 2
 """How often a search is taken up again where the profile of an interval met a lower cost."""
@@ -268,8 +272,15 @@ def _conclude(
     estimates = {n: estimates[n] for n in requested.parameters if n in estimates}
     if not brief:
         estimates = with_model_uncertainty(estimates, best, requested, left_out, log)
+    force = None if brief or little else neglected(best)
+    if force is not None:
+        estimates |= {
+            n: widened(estimates[n], i) for n, i in force.intervals.items() if estimates[n].status not in FIXED
+        }
+        warnings.append(force.sentence())
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
+    bands = bands if force is None or bands is None else with_force(bands, force)
     ahead = None if best.lost else judged(problem, best.x)
     scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
     skipped = _skipped(runs, watch=watch) if end.interrupted else ()

@@ -197,7 +197,7 @@ def _ordinary_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # type: ignore[attr-defined]
 
 
-def main(path: str, memory: str, rows: int) -> None:
+def write_log(path: str, memory: str, rows: int) -> None:
     """Write one log, its header the first line of this process's input, from a ring that another process made."""
     _ordinary_priority()
     about = LogHeader.of_metadata(json.loads(sys.stdin.buffer.readline()))
@@ -225,4 +225,4 @@ def main(path: str, memory: str, rows: int) -> None:
 
 if __name__ == "__main__":
     _path, _memory, _rows = sys.argv[1:]
-    main(_path, _memory, int(_rows))
+    write_log(_path, _memory, int(_rows))

@@ -9,7 +9,7 @@ from upright.physics import BUILT_IN
 from upright.physics.lagrange import derive
 from upright.physics.nonideal import NonidealCartPendulum, NonidealFuruta
 from upright.physics.plant import Plant, stem
-from upright.physics.stored import FOLDER, text_of
+from upright.physics.stored import FOLDER, file_text
 
 
 def variants() -> list[tuple[type[Plant], frozenset[str]]]:
@@ -22,7 +22,7 @@ def write_equations() -> None:
     """Write every variant's file."""
     FOLDER.mkdir(exist_ok=True)
     for cls, without in variants():
-        text = text_of(derive(cls, without=without))
+        text = file_text(derive(cls, without=without))
         (FOLDER / f"{stem(cls, without)}.json").write_text(text, encoding="utf-8", newline="\n")
 
 

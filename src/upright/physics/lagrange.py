@@ -173,7 +173,7 @@ def _steady(e: Any) -> Any:
     return e
 
 
-def mass_and_force(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any, Any]:
+def symbolic_mass_and_force(cls: type[Statement], *, without: Collection[str] = ()) -> tuple[Any, Any]:
     """Mass matrix M and force vector f of ``M a = f(q, v, u)``, as SymPy matrices, dry friction left out.
 
     Parameters named in `without` are zero.
@@ -201,7 +201,7 @@ def derive(cls: type[Statement], *, without: frozenset[str] = frozenset()) -> De
         When the energies are not those of a mechanical system in these coordinates.
     """
     p, q, v, u = symbols(cls)
-    M, f = mass_and_force(cls, without=without)
+    M, f = symbolic_mass_and_force(cls, without=without)
     T, V, D = _stated(cls, without)
     _check_jumps(cls, V, M, f)
     n = len(q)

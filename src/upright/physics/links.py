@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.physics.outline import Outline, beyond, tip
+from upright.physics.outline import Outline, point_beyond, tip
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
@@ -52,7 +52,7 @@ def _two_links(p: Any, theta: Any, theta_dot: Any, second: Any, second_dot: Any)
 def _two_lines(p: Any, theta: Any, second: Any) -> Outline:
     """Two links at absolute angles, the second one uniform."""
     elbow = tip(p.l_1, theta)
-    return [("theta_1", [(0, 0, 0), elbow]), ("theta_2", [elbow, beyond(elbow, tip(2 * p.l_c2, second))])]
+    return [("theta_1", [(0, 0, 0), elbow]), ("theta_2", [elbow, point_beyond(elbow, tip(2 * p.l_c2, second))])]
 
 
 class DoublePendulum(TwoLinks):

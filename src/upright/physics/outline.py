@@ -18,7 +18,7 @@ def tip(length: Any, angle: Any) -> Point:
     return length * sin(angle), 0, -length * cos(angle)
 
 
-def beyond(point: Point, by: Point) -> Point:
+def point_beyond(point: Point, by: Point) -> Point:
     """A point and a vector added."""
     return point[0] + by[0], point[1] + by[1], point[2] + by[2]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from upright.physics.outline import Outline, beyond, box, circle, tip
+from upright.physics.outline import Outline, box, circle, point_beyond, tip
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 from upright.quantities import quantity
@@ -99,7 +99,7 @@ class CartPendulum(Plant):
     def outline(p: Any, q: Any) -> Outline:
         """Rail, cart, uniform rod."""
         (x, theta), size = q, p.l_cg
-        rod = [(x, 0, 0), beyond((x, 0, 0), tip(2 * size, theta))]
+        rod = [(x, 0, 0), point_beyond((x, 0, 0), tip(2 * size, theta))]
         return [("", [(-4 * size, 0, 0), (4 * size, 0, 0)]), ("x", box(x, size / 1.5, size / 3)), ("theta", rod)]
 
 

@@ -22,7 +22,7 @@ def stored(name: str) -> Derived | None:
     return Derived(**content, joints=joints)
 
 
-def text_of(derived: Derived) -> str:
+def file_text(derived: Derived) -> str:
     """What `stored` reads again."""
     return json.dumps(asdict(derived), indent=1) + "\n"
 

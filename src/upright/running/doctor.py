@@ -14,7 +14,7 @@ from upright.rig import Rig
 from upright.rigs import Board, Fault, LiveRig, TwinPort
 from upright.rigs.board import fault_text
 from upright.rigs.rigfile import read_rig_file
-from upright.running.rig import described, stage_of
+from upright.running.rig import model_and_truth, stage_of
 
 MOVED = 0.05
 """How far a hand has to move a coordinate [rad, or 5 mm of a metre]."""
@@ -74,7 +74,7 @@ def check_up(
         When RIG.toml cannot be used.
     """
     file = read_rig_file(path)
-    model, _ = described(file)
+    model, _ = model_and_truth(file)
     stage = stage_of(path, balance=False)
     beside, rig, out = stage.supervisor, stage.supervisor.rig, list[CheckupFinding]()
     try:

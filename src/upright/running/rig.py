@@ -31,7 +31,7 @@ LEAN, NEAR = math.radians(30), math.radians(10)
 """How far a pendulum may lean in a run and at its start, where RIG.toml does not say."""
 
 
-def described(file: RigFile) -> tuple[Rig, Rig]:
+def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
     """The rig as it is known, and the one that a twin of it truly is."""
     if file.known is None:
         make = make_named(file.make, option="make")
@@ -103,7 +103,7 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         When RIG.toml does not say what is needed.
     """
     file = read_rig_file(path)
-    model, truth = described(file)
+    model, truth = model_and_truth(file)
     if bolted:
         truth = truth.changed(a_1=truth.plant.parameters()["a_1"] + bolted)
     kinds = model.plant.equilibria
@@ -224,7 +224,7 @@ def _shape(kind: str, numbers: Sequence[float], t: Array, seconds: float) -> Arr
     return size * np.sin(2 * math.pi * cycles)
 
 
-def open_loop(samples: Sequence[float], coordinates: int, period: float) -> Law:
+def excitation_law(samples: Sequence[float], coordinates: int, period: float) -> Law:
     """A law that looks at nothing and puts a signal out."""
     return Law(
         np.zeros((0, 0)), np.zeros((0, coordinates + 1)), np.zeros((1, 0)), np.eye(1, coordinates + 1, coordinates),

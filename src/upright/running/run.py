@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.basis import DESCRIBED, MEASURED, NOT_TRUSTED, Basis
-from upright.control.effort import FELT, Effort, RestEffort, effort, rest_effort, resting, shown
+from upright.control.effort import FELT, Effort, RestEffort, effort, rest_effort, rest_samples, shown
 from upright.control.preflight import BUSY, SATURATED, STABILISED
 from upright.errors import BadInput
 from upright.files import read_text
@@ -25,7 +25,7 @@ from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.protocol import Mode
 from upright.rigs.rigfile import RigFile, read_rig_file
-from upright.running.rig import described, open_loop, read_law, signal, stage_of, usual_limits
+from upright.running.rig import excitation_law, model_and_truth, read_law, signal, stage_of, usual_limits
 
 LEAST = 100
 """Fewest rows of which a last third tells anything."""
@@ -155,9 +155,9 @@ class RigRun:
         if self.request.law is None or self.end.stopped or log is None or len(log) < LEAST:
             return None
         columns = log.columns
-        if any(np.ptp(resting(columns[name])) > 0 for name, _ in log.header.references):
+        if any(np.ptp(rest_samples(columns[name])) > 0 for name, _ in log.header.references):
             return None
-        if self.request.from_rest and float(np.abs(resting(self.away)[:, -1]).max()) > ARRIVED:
+        if self.request.from_rest and float(np.abs(rest_samples(self.away)[:, -1]).max()) > ARRIVED:
             return None
         body = [c.name for c in self.model.plant.coordinates].index(self.model.plant.inputs[0].on)
         return rest_effort(self.t, self._applied, self.limit, body=self.away[:, body], count=self.count[body])
@@ -233,7 +233,7 @@ def run_rig(
     """
     library()  # what a log needs is missed before anything moves
     file = read_rig_file(request.rig)
-    model, _ = described(file)
+    model, _ = model_and_truth(file)
     balance, basis = request.law is not None, MEASURED if file.hardware and request.law is None else model.basis
     zero = file.zero if file.zero in model.plant.equilibria else next(iter(model.plant.equilibria))
     at = file.at if file.at in model.plant.equilibria else zero
@@ -252,7 +252,7 @@ def run_rig(
             law = replace(law, references=np.array(signal(request.reference, unit, model.period, request.seconds)))
     else:
         samples = request.samples or signal(request.excite, model.unit, model.period, request.seconds)
-        law = open_loop(samples, len(model.per_unit), model.period)
+        law = excitation_law(samples, len(model.per_unit), model.period)
     references = _references(law, model) if request.law is not None else ()
     folder.mkdir(parents=True, exist_ok=True)
     path = fresh(folder, request.stem, ".mcap")

@@ -302,6 +302,7 @@ def _bands(entry: Any) -> Bands:
     return Bands(
         quantile=_positive(table.get("quantile"), "bands.quantile"), level=_positive(table.get("level"), "bands.level"),
         spreads=spreads, names=tuple(names), covariance=covariance,
+        logs=tuple(_text(log, "bands.logs") for log in _list(table.get("logs", []), "bands.logs")),
         reached={n: _number(v, f"bands.reached.{n}") for n, v in _table(table.get("reached"), "bands.reached").items()},
     )  # fmt: skip
 

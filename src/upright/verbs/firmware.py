@@ -57,10 +57,10 @@ def firmware_build(
         When there is no such board, or a tool is missing.
     """
     from upright.report.page import Chapter, Facts, Part
-    from upright.rigs.firmware import board_of, build
+    from upright.rigs.firmware import board_of, build_image
 
     made = board_of(board)
-    image = build(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
+    image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
     whence = "As it comes with this package." if image.ready else "Built here."
     held = tuple((name.lower().replace("_", " "), str(value)) for name, value in image.ceilings.items())
     return Answer(
@@ -117,10 +117,10 @@ def firmware_flash(
         When the board does not answer, or does not hold what was written.
     """
     from upright.report.page import Chapter
-    from upright.rigs.firmware import board_of, build, flash
+    from upright.rigs.firmware import board_of, build_image, flash
 
     made = board_of(board)
-    image = build(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
+    image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
     flashed = flash(made, image.path, port, hand=hand)
     return Answer(
         flashed,
@@ -182,10 +182,10 @@ def _ceilings(path: Path) -> dict[str, int]:
     from upright.rigs.driver import FULL_SCALE
     from upright.rigs.firmware import ceilings_of
     from upright.rigs.rigfile import read_rig_file
-    from upright.running.rig import described
+    from upright.running.rig import model_and_truth
 
     file = read_rig_file(path)
-    rig, _ = described(file)
+    rig, _ = model_and_truth(file)
     limits = file.limits({c.name: c.unit for c in rig.plant.coordinates}, rig.unit)
     if limits is None:
         raise BadInput(f"{path} has no [limits]; the board's ceilings are made of them.")

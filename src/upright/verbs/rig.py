@@ -119,9 +119,9 @@ def _let_go(start: Start | float, rig: Path) -> float:
     if start == "" or isinstance(start, int | float):
         return float(start or 0.0)
     from upright.rigs.rigfile import read_rig_file
-    from upright.running.rig import described
+    from upright.running.rig import model_and_truth
 
-    model, _ = described(read_rig_file(rig))
+    model, _ = model_and_truth(read_rig_file(rig))
     start_state = read_start(start, model.states, model.state_units)
     last = model.states[-2]
     if any(value for name, value in start_state.items() if name != last):

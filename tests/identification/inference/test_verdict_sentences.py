@@ -394,3 +394,20 @@ def test_a_mass_that_went_to_nothing_fails_the_fit_in_a_sentence(status: str) ->
     assert any(r.startswith("J_d went to nothing, 5e-13 kg m^2, from a guess of 0.002:") for r in told[1].reasons)
     small = judged(estimates={"J_d": firm(4e-9, status="poorly determined", unit="kg m^2")}, rig=guessed)
     assert not any("went to nothing" in r for r in small[1].reasons)  # 2 millionths are small, and still a number
+
+
+def test_a_prediction_outside_its_bands_or_beyond_the_fit_is_told_as_such() -> None:
+    """Of 10 samples 3 lie inside, where 90 % should."""
+    t, miss = np.arange(10.0), np.where(np.arange(10) < 3, 0.0, 1.0)
+    seen = replace(
+        score("predict", theta=95.0), t=t, y=miss[:, None], simulated=np.zeros((10, 1)), measured=("theta",),
+        band={"theta": np.full(10, 0.5)},
+    )  # fmt: skip
+    told = predicts(("a", score(theta=99.0)), ("b", seen))
+    assert told.answer == "in part"
+    assert any("hold only b theta 30 % of the samples" in reason for reason in told.reasons)
+    wide = replace(seen, band={"theta": np.full(10, 2.0)}, beyond=("Run 'b' extrapolates: theta reaches 2 rad.",))
+    told = predicts(("a", score(theta=99.0)), ("b", wide))
+    assert told.answer == "yes"
+    assert told.headline.endswith("Outside what the fit has seen: b.")
+    assert "Run 'b' extrapolates: theta reaches 2 rad." in told.reasons

@@ -14,7 +14,7 @@ from upright.errors import BadInput
 from upright.identification import Run, RunScore
 from upright.identification.estimate import identify
 from upright.identification.ladder.cross_validation import HeldOut, cross_validate, leave_one_out
-from upright.identification.ladder.decision import by_chance, compare, scatter
+from upright.identification.ladder.decision import by_chance, compare, gain_scatter
 from upright.identification.ladder.repeats import repeats, same
 from upright.physics import Furuta, Pendulum
 
@@ -139,7 +139,7 @@ def test_an_error_below_rounding_is_no_error():
 def test_the_scatter_is_students(gains):
     """One sigma of Student's distribution times the standard error of the mean, as scipy's statistics have both."""
     expected = stats.t.ppf(stats.norm.cdf(1), len(gains) - 1) * stats.sem(gains)
-    assert scatter(np.array(gains)) == pytest.approx(expected, rel=1e-9)
+    assert gain_scatter(np.array(gains)) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("terms", [1, 3])

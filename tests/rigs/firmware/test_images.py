@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.boards import COUNTS, FULL_SCALE, Board
 from upright.errors import BadInput
-from upright.rigs.firmware import BOARDS, board_of, build, ceilings_of, sources
+from upright.rigs.firmware import BOARDS, board_of, build_image, ceilings_of, sources
 from upright.rigs.firmware import images as images_of
 from upright.rigs.protocol import Limits
 
@@ -32,7 +32,7 @@ def needs(board):
 @pytest.mark.parametrize(("board", "drive"), EVERY, ids=lambda v: getattr(v, "name", v))
 def test_an_image_is_the_same_to_the_byte_each_time(board, drive, tmp_path):
     needs(board)
-    first, again = (build(board, drive, tmp_path / part).path.read_bytes() for part in ("first", "again"))
+    first, again = (build_image(board, drive, tmp_path / part).path.read_bytes() for part in ("first", "again"))
     assert first == again
     assert len(first) > 20_000
     assert str(tmp_path).encode() not in first
@@ -41,7 +41,7 @@ def test_an_image_is_the_same_to_the_byte_each_time(board, drive, tmp_path):
 def test_every_drive_has_an_image_of_its_own(tmp_path):
     for board in BOARDS.values():
         needs(board)
-        made = {build(board, drive, tmp_path).path.read_bytes() for drive in board.drives}
+        made = {build_image(board, drive, tmp_path).path.read_bytes() for drive in board.drives}
         assert len(made) == len(board.drives)
 
 
@@ -55,7 +55,7 @@ def test_a_wheel_has_all_that_an_image_is_built_from(tmp_path):
         needs(board)
         name = board.image(drive)
         subprocess.run(["make", "-s", "-C", tmp_path, f"B={tmp_path}/b", f"{tmp_path}/b/{name}"], check=True)
-        assert (tmp_path / "b" / name).read_bytes() == build(board, drive, tmp_path / "out").path.read_bytes()
+        assert (tmp_path / "b" / name).read_bytes() == build_image(board, drive, tmp_path / "out").path.read_bytes()
 
 
 def test_ceilings_are_a_rig_s_limits_in_counts_ticks_and_percent():
@@ -91,14 +91,14 @@ def test_without_a_compiler_the_image_of_the_package_is_taken_or_what_is_missing
     monkeypatch.setattr(shutil, "which", lambda tool: None)
     monkeypatch.setattr(images_of, "READY", tmp_path / "ready")
     with pytest.raises(BadInput, match=r"make and avr-gcc must be on this machine \(sudo apt install make gcc-avr"):
-        build(mega, "pair", tmp_path)
+        build_image(mega, "pair", tmp_path)
     (tmp_path / "ready").mkdir()
     (tmp_path / "ready" / "atmega2560-pair.hex").write_bytes(b"as built")
-    image = build(mega, "pair", tmp_path / "out")
+    image = build_image(mega, "pair", tmp_path / "out")
     assert image.ready
     assert image.path.read_bytes() == b"as built"
     with pytest.raises(BadInput, match="with ceilings of its own"):
-        build(mega, "pair", tmp_path, {"COMMAND": 50})
+        build_image(mega, "pair", tmp_path, {"COMMAND": 50})
 
 
 @pytest.mark.parametrize("name", ["uno", "Nano"])

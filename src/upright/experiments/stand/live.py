@@ -22,7 +22,7 @@ from upright.records import Array, Record
 from upright.rig.makes import MAKES, Make, make_of_vendor
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
-from upright.running.rig import described, usual_limits
+from upright.running.rig import model_and_truth, usual_limits
 from upright.running.run import RigRun, RunRequest, run_rig
 from upright.study.stored_rig import read_stored_rig
 
@@ -181,7 +181,7 @@ def live_stand(
     file = read_rig_file(path)
     if file.performed == REPLAYED:
         raise BadInput(f'{path}: a replay does not answer commands; experiments need a rig or kind = "twin".')
-    rig, truth = described(file)
+    rig, truth = model_and_truth(file)
     units = {c.name: c.unit for c in rig.plant.coordinates}
     limits = file.limits(units, rig.unit, usual_limits(rig))
     if limits is None:

@@ -86,7 +86,7 @@ def tracker(rig: Rig, name: str, K: Array, k_pf: float, *, requested: Roots | No
     return Tracker(
         name=name, K=np.ravel(K), k_pf=k_pf, law=law, poles=loop_poles(rig, law),
         requested=np.zeros(0, dtype=np.complex128) if requested is None else requested, stiffness=rig.gain * k_pf,
-        play=play(rig, np.ravel(K), k_pf),
+        play=hunting_play(rig, np.ravel(K), k_pf),
     )  # fmt: skip
 
 
@@ -124,7 +124,7 @@ def far(model: StateSpace) -> Array:
     return model.C[-1]
 
 
-def play(rig: Rig, K: Array, k_pf: float) -> float:
+def hunting_play(rig: Rig, K: Array, k_pf: float) -> float:
     """Largest error of the far body at rest that dry friction can hold, two bodies without springs to ground.
 
     The far body stays while ``|k (x_1 - x_2)| <= f_2``, the near one while ``|gain u - k (x_1 - x_2)| <= f_1``; with

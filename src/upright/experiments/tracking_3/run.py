@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from upright.basis import SIMULATED
 from upright.control import Trial, trial
-from upright.control.effort import Effort, RestEffort, effort, rest_effort, resting
+from upright.control.effort import Effort, RestEffort, effort, rest_effort, rest_samples
 from upright.control.score import StepFigures, step_figures
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
@@ -355,7 +355,7 @@ def attempt(rig: Rig, law: Tracker, step: float) -> StepTrial:
 
 def _rest(t: Array, u: Array, limit: float) -> RestEffort:
     """Command at rest about its mean, which a spring to ground may take to hold a place."""
-    return rest_effort(t, u - float(np.mean(resting(u))), limit)
+    return rest_effort(t, u - float(np.mean(rest_samples(u))), limit)
 
 
 def figured(trial: Trial, step: float) -> StepTrial:

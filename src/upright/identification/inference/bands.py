@@ -28,11 +28,13 @@ from upright.identification.inference.loop import matrix_root
 from upright.identification.inference.reach import beyond, reached
 from upright.identification.model.bands import LEVEL, Bands, Spread
 from upright.identification.model.fit import RunScore
-from upright.identification.model.grey_box import NOISE, GreyBox
+from upright.identification.model.grey_box import NOISE, GreyBox, Parameter
 from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.normal_equations import finite, pseudo_inverse, slopes
 from upright.identification.problem.residuals import ROUNDING, Problem, formulate
 from upright.identification.problem.tracks import Track
+from upright.identification.problem.unknowns import friction_names
+from upright.physics.actuator import ACTUATOR
 
 Array = NDArray[np.float64]
 
@@ -41,6 +43,13 @@ BLOCKS = 4
 
 NORMAL, MOST = 1.645, 5.0
 """Widths that hold 90 % of normal errors, and that no prediction is worth: such a block was lost, not missed."""
+
+FRICTION, GAIN = 0.13, 0.1
+"""Standard deviations, relative, of friction and gain from log to log: friction of two runs of one day differed by
+13 %, and two of the public rigs drift by 10 to 20 % between days."""
+
+MANY = 3
+"""Logs from which on a fit has seen how much they differ."""
 
 LEAST = 1e-3
 """Share of how much a signal varies that nobody minds to be missed."""
@@ -104,6 +113,7 @@ def calibrated(best: Optimum) -> Bands | None:
         names=tuple(problem.unknowns[i].name for i in shared),
         covariance=possible(covariance[np.ix_(shared, shared)] * np.outer(slope, slope)),
         reached=reached(problem.rig, [track.run for track in best.problem.tracks]),
+        logs=tuple(dict.fromkeys(log for track in problem.tracks if (log := log_of(track.run)))),
     )
     missed = [_missed(problem, met[block.run], block, covariance, best.x, bands) for block in blocks]
     if len(blocks) < 2:
@@ -193,6 +203,27 @@ def _missed(problem: Problem, met: Sensitivity, block: _Block, covariance: Array
     track = problem.tracks[block.run]
     width = _width(track, bands, met.age[here], variance)
     return np.concatenate([np.abs(error[:, k]) / width[c] for k, c in _signals(track)])
+
+
+def log_of(run: Run) -> str:
+    """The log that a run is from, as its source names it; empty where nobody says."""
+    return run.source.partition(";")[0]
+
+
+def of_another_day(bands: Bands, rig: GreyBox, run: Run) -> Array:
+    """The covariance (names, names) with what friction and gain may differ by in a log of its own.
+
+    All friction together, and the drive's gain, by `FRICTION` and `GAIN` of themselves. Where the fitted runs are from
+    `MANY` logs or more these differed as well, and the covariance holds it already.
+    """
+    log = log_of(run)
+    if not log or not bands.logs or log in bands.logs or len(bands.logs) >= MANY:
+        return bands.covariance
+    value = {n: p.value for n, p in rig.parameters.items()}
+    rubs = friction_names(rig)
+    friction = np.array([FRICTION * value.get(n, 0.0) if n in rubs else 0.0 for n in bands.names])
+    gain = np.array([GAIN * value.get(n, 0.0) if n == "actuator.gain" else 0.0 for n in bands.names])
+    return bands.covariance + np.outer(friction, friction) + np.outer(gain, gain)
 
 
 def _signals(track: Track) -> list[tuple[int, str]]:
@@ -293,10 +324,12 @@ def banded(
     own : mapping of str to float
         What was estimated from the run itself, by its key, see `Problem.key`.
     """
-    names = [n for n in bands.names if n in rig.parameters and math.isfinite(rig.parameters[n].value)]
+    parameters = {n: Parameter(name=n, value=ACTUATOR[n].default) for n in bands.names if n in ACTUATOR}
+    parameters |= rig.parameters
+    names = [n for n in bands.names if n in parameters and math.isfinite(parameters[n].value)]
     if run.filtered:  # what disturbs a plant between two samples counts, not its numbers
         names = []
-    uncertain = {n: replace(rig.parameters[n], estimate=True) for n in names}
+    uncertain = {n: replace(parameters[n], estimate=True) for n in names}
     problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, stated=groups)
     if run.filtered and plain.horizon is not None:
         problem = problem.ahead(plain.horizon)
@@ -315,7 +348,7 @@ def banded(
             rows = np.array(places)[shared]
             value = problem.value(x)
             natural = np.array([1 / value[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
-            C = bands.covariance[np.ix_(rows, rows)]
+            C = of_another_day(bands, rig, run)[np.ix_(rows, rows)]
             variance = _variance((slope * natural)[..., shared], C)
     width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
     return replace(

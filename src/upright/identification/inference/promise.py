@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from upright.identification.inference.verdict import DROP, GOOD
+from upright.identification.inference.verdict import DROP, FEWEST, GOOD
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import RunScore
-
-FEWEST = 70.0
-"""Percent of a signal inside its band below which a prediction falls short of 90 %.
-
-What is left over comes in waves, so that of one run fewer than promised lie inside by chance: of twins with physics
-that their models lack one signal in eleven had fewer than this (`python -m benchmarks bands`).
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +21,7 @@ class PredictionCheck:
 def promise(
     runs: Mapping[str, RunScore], bands: Bands | None, fitted: Mapping[str, Mapping[str, float]] | None = None
 ) -> PredictionCheck:
-    """Whether predicted runs are met as well as a fit promises.
+    """Whether predicted runs are met as well as a fit promises; what lies beyond what it has seen is told first.
 
     Parameters
     ----------
@@ -39,6 +32,16 @@ def promise(
     fitted : mapping, optional
         Fit percent by label and signal of the runs that were fitted.
     """
+    plain = _kept(runs, bands, fitted)
+    outside = [label for label, s in runs.items() if s.beyond]
+    if not outside:
+        return plain
+    return replace(plain, sentence=f"Outside what the fit has seen: {', '.join(outside)}. {plain.sentence}")
+
+
+def _kept(
+    runs: Mapping[str, RunScore], bands: Bands | None, fitted: Mapping[str, Mapping[str, float]] | None
+) -> PredictionCheck:
     if bands is None:
         return _as_the_fitted(runs, fitted or {})
     inside = {(label, signal): p for label, s in runs.items() for signal, p in s.inside.items()}

@@ -104,11 +104,11 @@ def with_ties(estimates: Mapping[str, Estimate], tied: Sequence[Tie]) -> dict[st
     out = dict(estimates)
     for tie in reversed(tied):
         for name, other in ((tie.first, tie.second), (tie.second, tie.first)):
-            if matters(estimates[name]):
+            if leaves_open(estimates[name]):
                 out[name] = replace(estimates[name], status=f"tied to {other}")
     return out
 
 
-def matters(e: Estimate) -> bool:
+def leaves_open(e: Estimate) -> bool:
     """Whether a tie leaves a number that is well determined open."""
     return e.status == "well determined" and not e.half <= NARROW

@@ -84,7 +84,7 @@ def compare(poorer: Sequence[RunScore], richer: Sequence[RunScore], quanta: Sequ
     else:
         gains = np.concatenate([_stretch_gains(a, b, q) for a, b, q in zip(poorer, richer, quanta, strict=True)])
         between = "stretches"
-    return Comparison(gain=float(gains.mean()), scatter=scatter(gains), pairs=gains.size, between=between)
+    return Comparison(gain=float(gains.mean()), scatter=gain_scatter(gains), pairs=gains.size, between=between)
 
 
 def by_chance(terms: int, noise: float) -> float:
@@ -97,7 +97,7 @@ def by_chance(terms: int, noise: float) -> float:
     return float(chdtri(terms, CHANCE)) * noise**2 if terms > 0 else 0.0
 
 
-def scatter(gains: Array) -> float:
+def gain_scatter(gains: Array) -> float:
     """One standard error of the mean of independent gains (n,), as Student's distribution gives it for so few."""
     from scipy.special import stdtrit
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.inference.scoring import fit_percent
-from upright.identification.ladder.decision import scatter
+from upright.identification.ladder.decision import gain_scatter
 from upright.identification.model.fit import RunScore
 from upright.identification.model.runs import Run
 
@@ -143,7 +143,7 @@ def at_ceiling(groups: Sequence[Repeats], scores: Mapping[str, RunScore]) -> boo
         for label, error in group.errors.items()
         if label in scores
     ]
-    return bool(gains) and float(np.mean(gains)) <= scatter(np.array(gains))
+    return bool(gains) and float(np.mean(gains)) <= gain_scatter(np.array(gains))
 
 
 def _alike(a: Any, b: Any) -> bool:

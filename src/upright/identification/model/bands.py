@@ -39,7 +39,7 @@ class Bands:
 
     One is that of what the fit leaves over, `spreads` by signal; the other what the uncertainty of the numbers `names`,
     with the `covariance` [SI], does to this prediction. `reached` is the largest size of every command, speed, position
-    and horizon of the fitted runs, see `upright.identification.inference.reach`.
+    and horizon of the fitted runs, see `upright.identification.inference.reach`, `logs` are the logs they are from.
     """
 
     quantile: float
@@ -47,6 +47,7 @@ class Bands:
     names: tuple[str, ...] = ()
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     reached: Mapping[str, float] = field(default_factory=dict[str, float])
+    logs: tuple[str, ...] = ()
     level: float = LEVEL
 
     def spread(self, signal: str, horizon: float | None) -> Spread | None:

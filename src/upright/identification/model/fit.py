@@ -177,6 +177,8 @@ class RunScore:
     @property
     def inside(self) -> dict[str, float]:
         """Percent of the scored samples inside the band, by signal; empty without one."""
+        if not self.band:
+            return {}
         scored = self.t >= self.t[0] + self.score_from - 1e-9
         missed = {s: np.abs(self.y[:, k] - self.simulated[:, k]) for k, s in enumerate(self.measured)}
         return {s: 100 * float(np.mean((missed[s] <= half)[scored])) for s, half in self.band.items()}

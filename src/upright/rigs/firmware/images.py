@@ -67,7 +67,7 @@ def ceilings_of(limits: Limits, counts: tuple[float, ...], full_scale: float) ->
     return out
 
 
-def build(board: BoardKind, drive: str, out: Path, ceilings: Mapping[str, int] | None = None) -> Image:
+def build_image(board: BoardKind, drive: str, out: Path, ceilings: Mapping[str, int] | None = None) -> Image:
     """The image of a board in a folder; the one that came with the package where it is as good and nothing can build.
 
     Raises

@@ -94,7 +94,7 @@ class Kernel:
         from upright.simulation.lowering import webassembly
 
         def packed() -> bytes:
-            made = webassembly.compiled(
+            made = webassembly.compiled_wasm(
                 self.text,
                 name,
                 dict(zip(RUN_ARGUMENTS.split(", "), RUN, strict=True)),

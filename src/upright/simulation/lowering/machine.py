@@ -140,7 +140,7 @@ def _page() -> Any:
 
 
 @cache
-def page() -> Platform:
+def page_platform() -> Platform:
     """What modules are written for that run in a page."""
     return Platform(triple=_PAGE, layout=str(_page().target_data), head=0)
 

@@ -46,7 +46,7 @@ class Wasm:
     imports: tuple[str, ...]
 
 
-def compiled(text: str, entry: str, arguments: Mapping[str, Type], *, lanes: int, strict: bool) -> Wasm:
+def compiled_wasm(text: str, entry: str, arguments: Mapping[str, Type], *, lanes: int, strict: bool) -> Wasm:
     """Module that exports ``run(...)``, the entry of a text with its arguments given plainly.
 
     Whole numbers and sizes are 32 bits wide, so that JavaScript's own numbers are passed: an array is its address and
@@ -84,7 +84,7 @@ def compiled(text: str, entry: str, arguments: Mapping[str, Type], *, lanes: int
             passed.append(f"i64 %w{part}")
     body = "\n".join([*lines, f"  call void @{symbol}({', '.join(passed)})", "  ret void"])
     last = f"define void @{EXPORT}({', '.join(parameters)}) nounwind {{\n{body}\n}}\n"
-    return linked(machine.wasm(module.whole(machine.page(), last)), EXPORT)
+    return linked(machine.wasm(module.whole(machine.page_platform(), last)), EXPORT)
 
 
 MATH = ("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "exp", "expm1", "hypot",

@@ -223,10 +223,12 @@ def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | 
     promised = promise(runs, bands)
     part = Part("How much of each signal is explained", (score_table(runs),))
     chapter = Chapter(
-        title="Prediction", verdict=f"The worst signal is explained to {worst:.1f} %. {promised.sentence}",
+        title="Prediction", verdict=f"{promised.sentence} The worst signal is explained to {worst:.1f} %.",
         parts=(part,), sound=promised.holds, warnings=tuple(sentence for s in runs.values() for sentence in s.beyond),
         numbers={
-            label: {"fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside}
+            label: {
+                "fit_percent": dict(s.fit_percent), "horizon": s.horizon, "inside": s.inside, "beyond": list(s.beyond),
+            }
             for label, s in runs.items()
         },
     )  # fmt: skip

@@ -101,7 +101,7 @@ def predict(
     promised = promise(scores, fitted.bands, fitted.scores)
     fitted_runs = {run.label: label for run in runs if (label := fitted.fitted_run(run.source))}
     verdict = f"{_fitted_note(fitted_runs, len(runs))}{promised.sentence}"
-    names = ("role", "fit_percent", "horizon", "adapted", "offer", "inside", "beyond")
+    names = ("beyond", "role", "fit_percent", "horizon", "adapted", "offer", "inside")
     numbers: dict[str, Any] = {
         "model": of,
         "study": on,

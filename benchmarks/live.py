@@ -1,0 +1,145 @@
+"""How fast does a rig move in a page: its kernel beside the native one, the answer of 200 rigs, pictures a second?
+
+One motion of 5 s at 1 kHz (Furuta pendulum, dry friction on both joints, counts, sampled law) in Node, beside the same
+kernel as machine code of this processor; then the page of `upright play` in Chromium: the answer of 200 rigs of 3 s to
+a change, by the clock on the wall and with as many workers as there are processors, and pictures a second meanwhile.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from benchmarks.measure import Line, Target, spread
+
+POLES = "-4.5+-2j, -20, -3"
+ANSWER, FRAMES, PAGE, RATIO = 0.05, 55.0, 150_000, 1.5
+"""Asked: seconds to an answer, pictures a second, bytes of the page, times the native kernel."""
+
+TIMED = """
+const k = new Kernel(given.kernel), best = [];
+for (let i = 0; i < given.rounds; i++) {
+  const before = process.cpuUsage();
+  for (let j = 0; j < given.each; j++) k.run();
+  const used = process.cpuUsage(before);
+  best.push((used.user + used.system) / 1e6 / given.each);
+}
+process.stdout.write(JSON.stringify(best));
+"""
+
+
+ANSWERS = """(async (answers) => {
+  const first = (tell) => upright.answered.length ? tell() : requestAnimationFrame(() => first(tell));
+  await new Promise(first);
+  upright.answered.length = 0;
+  for (let i = 0; i < answers; i++) {
+    upright.twin.set({friction: 1 + i / 100});
+    await upright.answer();
+  }
+  return upright.answered;
+})"""
+PICTURES = """new Promise((tell) => {
+  const k = upright.frames, t = performance.now();
+  const look = () => performance.now() - t > 3000 ? tell((upright.frames - k) / 3) : requestAnimationFrame(look);
+  look();
+})"""
+
+
+def rig() -> Any:
+    """A rig of the size of a laboratory's."""
+    import upright as up
+
+    arm = up.Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=0.003, b_2=2e-4, b_1c=0.008, b_2c=3e-4)
+    return up.Rig.known(arm, name="bench", gain="0.65 N m/V", limit="5 V", period="1 ms", counts=4096)
+
+
+def motion(rounds: int) -> tuple[list[float], list[float], int]:
+    """CPU seconds of one motion of 5 s, natively and in Node, and the bytes of its module."""
+    import numpy as np
+
+    from upright.laws import state_feedback
+    from upright.live import SCRIPTS
+    from upright.live.kernel import described
+    from upright.simulation import Simulator, choose
+
+    plant = rig().plant
+    law = state_feedback([0.2, 0.3, 3.0, 0.5], 1e-3, memory=0.7, target=[0.0, math.pi], resolution=1e-3)
+    values = dict(plant.parameters())
+    derived = plant.derived_for(values)
+    simulator = Simulator(derived=derived, flavour=choose(derived, values, loop=law), dt=1e-3, loop=law)
+    table, x0 = simulator.table(values, 1), np.array([[0.0], [0.0], [math.pi + 0.1], [0.0]])
+    simulator.run(table, x0, samples=5001)
+    here: list[float] = []
+    for _ in range(rounds):
+        before = time.process_time()
+        for _ in range(20):
+            simulator.run(table, x0, samples=5001)
+        here.append((time.process_time() - before) / 20)
+    kernel = described(simulator, simulator.call(table, x0, samples=5001, width=1), width=1)
+    script = SCRIPTS[0].read_text(encoding="utf-8")
+    body = f"{script}\nconst given = JSON.parse(require('fs').readFileSync(0, 'utf8'));\n{TIMED}"
+    node = subprocess.run(
+        ["node", "-e", body], input=json.dumps({"kernel": kernel, "rounds": rounds, "each": 20}),
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return here, json.loads(node.stdout), len(simulator.wasm(1).code)
+
+
+def page(path: Path, answers: int) -> dict[str, Any]:
+    """What a browser measures of a page."""
+    from playwright.sync_api import sync_playwright
+
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+    with sync_playwright() as runner:
+        opened = runner.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        tab = opened.new_page()
+        tab.goto(path.as_uri())
+        first = tab.evaluate("performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? 0")
+        times = tab.evaluate(f"{ANSWERS}({answers})")
+        frames = tab.evaluate(PICTURES)
+        opened.close()
+    return {"answers": [1e-3 * t for t in times], "frames": frames, "first": 1e-3 * first}
+
+
+def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
+    """Kernel, page, browser; what is missing here is said."""
+    import upright as up
+
+    lines: list[Line] = []
+    progress("one motion")
+    if shutil.which("node"):
+        here, there, size = motion(3 if quick else 9)
+        lines.append(Line(contender="native kernel, 5 s at 1 kHz", seconds=spread(here)))
+        ratios = [b / a for a, b in zip(here, there, strict=True)]
+        lines.append(
+            Line(contender="the same in Node", seconds=spread(there), ratio=spread(ratios),
+                 target=Target(most=RATIO), note=f"module of {size:,} bytes")
+        )  # fmt: skip
+    else:
+        lines.append(Line(contender="the same in Node", note="Node is missing"))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "play.html"
+        progress("the page")
+        played = up.play(rig(), poles=POLES, out=path)
+        size = path.stat().st_size
+        note = f"{size:,} bytes (at most {PAGE:,} asked), {played.numbers['held']} of 200 rigs stabilised"
+        try:
+            seen = page(path, 5 if quick else 20)
+        except (ImportError, StopIteration):
+            return [*lines, Line(contender="the page", note=f"{note}; Playwright or Chromium is missing")]
+        lines.append(
+            Line(contender="200 rigs of 3 s answer in Chromium", seconds=spread(seen["answers"]),
+                 target=Target(most=ANSWER, of="seconds"), note=note)
+        )  # fmt: skip
+        lines.append(
+            Line(contender="first picture", seconds=spread([seen["first"]]), target=Target(most=0.3, of="seconds"),
+                 note=f"{seen['frames']:.0f} pictures a second (at least {FRAMES:.0f} asked)")
+        )  # fmt: skip
+    return lines

@@ -1,0 +1,78 @@
+"""A constant force that the model lacks is found, and intervals and bands hold what it changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.identification.twins import FURUTA, noisy, rig
+from upright.identification import Run
+from upright.identification.estimate import identify
+from upright.identification.inference.bands import FRICTION, MANY, of_another_day
+from upright.identification.inference.neglected import OFFSET
+from upright.identification.model.bands import Bands
+from upright.physics import Furuta
+from upright.simulation import simulate
+
+GUESSES = {"J_d": 0.006, "b_1": 6e-3, "b_1c": 2e-3}
+LEAN = 2e-3
+"""Torque [N m] on the arm that nobody logs; what drives it is 40e-3."""
+
+
+def driven(label: str, role: str, force: float, *, slow: float = 0.7, seed: int = 1) -> Run:
+    """A Furuta pendulum whose arm is driven, and pulled by a constant torque besides."""
+    dt, n = 4e-3, 1501
+    t = np.arange(n) * dt
+    u = (0.04 * np.sin(2 * np.pi * slow * t) + 0.03 * np.sin(2 * np.pi * 1.9 * t))[:, None]
+    x = simulate(Furuta(**FURUTA), {"actuator.offset": force}, [0.0, 0.0, 0.5, 0.0], u, dt, samples=n, substeps=2)
+    run = Run(label=label, role=role, t=t, u=u, y=x[:, [0, 2], 0], measured=("psi", "theta"))  # type: ignore[arg-type]
+    return noisy(run, 1e-3, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def pulled():
+    return identify(
+        rig(Furuta, FURUTA, GUESSES), [driven("one", "fit", LEAN), driven("two", "predict", LEAN, slow=0.5)]
+    )
+
+
+def test_the_force_is_found_and_the_line_that_asks_for_it_is_written(pulled) -> None:
+    (said,) = [w for w in pulled.warnings if "constant force" in w]
+    low, high = (float(word.strip("():")) for word in said.split(" (")[1].split(")")[0].split(" to "))
+    assert low <= LEAN <= high
+    assert "[actuator] offset = { guess =" in said
+
+
+def test_intervals_hold_the_truth_that_the_force_has_moved_the_estimates_from(pulled) -> None:
+    assert abs(pulled.estimates["b_1c"].value / FURUTA["b_1c"] - 1) > 0.1  # it took the force's part
+    for name in GUESSES:
+        low, high = pulled.estimates[name].interval
+        assert low <= FURUTA[name] <= high, name
+
+
+def test_bands_hold_what_the_force_does_to_another_run(pulled) -> None:
+    assert pulled.bands.names[-1] == OFFSET
+    assert min(pulled.runs["two"].inside.values()) > 85
+
+
+def test_no_force_is_told_where_none_is() -> None:
+    fit = identify(rig(Furuta, FURUTA, GUESSES), [driven("one", "fit", 0.0, seed=3)])
+    assert not any("constant force" in w for w in fit.warnings)
+    assert OFFSET not in fit.bands.names  # type: ignore[union-attr]
+
+
+def test_a_log_of_another_day_has_its_friction_uncertain_unless_many_logs_were_fitted() -> None:
+    known = rig(Furuta, FURUTA, {})
+    run = replace(driven("one", "predict", 0.0), source="b.csv (sha256 1); 0 to 6 s")
+    bands = Bands(
+        quantile=1.645, spreads={}, names=("J_d", "b_1"), covariance=np.zeros((2, 2)), logs=("a.csv (sha256 0)",)
+    )
+    C = of_another_day(bands, known, run)
+    assert C[1, 1] == pytest.approx((FRICTION * FURUTA["b_1"]) ** 2)
+    assert C[0, 0] == 0
+    same = replace(run, source="a.csv (sha256 0); 6 to 9 s")
+    assert not of_another_day(bands, known, same).any()
+    many = replace(bands, logs=tuple(f"{k}.csv" for k in range(MANY)))
+    assert not of_another_day(many, known, run).any()
