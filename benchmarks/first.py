@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import tempfile
 import threading
@@ -36,6 +37,10 @@ GAIN = {"furuta": 0.05, "cart-pendulum": 1.7, "torsional-2": 0.1, "rectilinear-2
 SECONDS, KEPT, OFF = 10.0, 0.9, 0.2
 ENDS = ("trusted", "not trusted", "refused", "out of time", "error")
 DIALECTS = ("brackets", "milliseconds", "tabs")
+NOT_MEASURED = re.compile(
+    r"^(u|n|sample)$|target|reference|command|duty|effort|input|output|feedforward|saturation|velocity|offset", re.I
+)
+"""Names of columns that say what was asked for, and no place of a body."""
 NO_LOGS = ("README", "EstimatedParameters", "parameters.yaml", "controller.toml", "README_system_id")
 
 
@@ -164,7 +169,7 @@ def moving(source: Source) -> tuple[float, float]:
     inside = np.zeros(t.size, bool)
     for name, (_, y) in source.columns.items():
         whole = float(np.ptp(y))
-        if name == "u" or not whole or y.size <= 4 * n:
+        if NOT_MEASURED.search(name) or not whole or y.size <= 4 * n:
             continue
         windows = np.lib.stride_tricks.sliding_window_view(y, n)
         reach = np.ptp(windows, axis=1)
@@ -189,7 +194,7 @@ def limited(seconds: float) -> Iterator[None]:
         raise OutOfTime
 
     before = signal.signal(signal.SIGPROF, end)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.setitimer(signal.ITIMER_PROF, seconds, 1.0)  # again, should C have swallowed the first
     try:
         yield
     finally:
@@ -336,11 +341,12 @@ def _told(contacts: Sequence[Contact]) -> str:
 
 def agreeing(contacts: Sequence[Contact]) -> tuple[int, int]:
     """Logs whose dialects came to the same plant, the same end and the same numbers (a tenth of the interval), of how
-    many."""
+    many that were met in several."""
     logs: dict[str, list[Contact]] = {}
     for c in contacts:
         logs.setdefault(c.log, []).append(c)
-    return sum(_same(each) for each in logs.values()), len(logs)
+    several = [each for each in logs.values() if len(each) > 1]
+    return sum(_same(each) for each in several), len(several)
 
 
 def _same(each: Sequence[Contact]) -> bool:
