@@ -97,6 +97,14 @@ def _slow_tick(story: Story) -> None:
     story.beside.clock = lambda: story.on.port.true_time
 
 
+def _disobeys(story: Story) -> None:
+    """A tap, whose answer stays on the output whatever is written; then somebody stops the run."""
+    story.on.tap(1.0)
+    story.go(0.04)
+    story.on.port.obeys = False
+    story.beside.give_up(F.STOP, "Stopped by hand.")
+
+
 SOUND = tuple(
     Hazard(what=f"nothing broken, a tap of {speed:g} rad/s", by=F(0), stands=True,
            tell=in_loop(lambda s: None, after=1.0, taps=speed)) for speed in (0.5, 1.0, 2.0)
@@ -176,6 +184,8 @@ ON_THE_TWIN = (
       for share in (0.5, 0.3)),
     Hazard(what="the board's tick takes twice its length", by=F.MODEL,
            tell=in_loop(_slow_tick, first=lambda s: setattr(s.beside, "clock", lambda: s.on.port.true_time))),
+    Hazard(what="the drive does not obey: zero and power off do nothing, stopped by hand", by=F.MODEL,
+           tell=in_loop(_disobeys)),
     *TIMES,
     Hazard(what="host killed (-9)", by=F.WATCHDOG, within=LIMITS.watchdog, tell=silent(1.0)),
     Hazard(what="link cut", by=F.WATCHDOG, within=LIMITS.watchdog,

@@ -7,6 +7,7 @@ Friction is viscous, the drive has neither delay nor lag: whatever else the twin
 
 from __future__ import annotations
 
+import math
 import tempfile
 import threading
 from functools import cache
@@ -124,6 +125,18 @@ class Encoders:
 
     def __init__(self, board: Board) -> None:
         self._board = board
+        self._slips = (0, 0.0, 0.0)
+
+    def slipping(self, channel: int, counts: float) -> None:
+        """It loses so many counts more with every tick."""
+        self._slips = channel, counts, 0.0
+
+    def tick(self) -> None:
+        """A tick of the board is over."""
+        channel, rate, behind = self._slips
+        if rate and abs(behind + rate) >= 1.0:
+            self.lost(channel, math.trunc(behind + rate))
+        self._slips = channel, rate, math.fmod(behind + rate, 1.0)
 
     def dead(self, channel: int) -> None:
         self._board.do(f"dead {channel}")
@@ -157,6 +170,7 @@ class FirmwareHazards:
         tick, psi, _, theta, _, command, enabled, _ = self.board.state()
         if not self._trace or 1e-3 * tick > self._trace[-1][0]:
             self._trace.append((1e-3 * tick, self._output, psi, theta))
+            self.encoders.tick()
         self._output = STEP * command * enabled
         return tick
 

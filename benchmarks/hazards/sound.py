@@ -17,13 +17,13 @@ import numpy as np
 
 from benchmarks.hazards.abreast import Twins
 from benchmarks.hazards.story import POLES
+from upright.control.still import StillDrive, StillPendulum
 from upright.control.watch import Watch
 from upright.experiments.nonideal import nonideal
 from upright.gains import feedback, filtered, place
 from upright.laws import Law
 from upright.rig import Rig
 from upright.rig.makes import make_rig
-from upright.rigs.driven import StillDrive, StillPendulum
 
 MAKES = ("furuta", "linear")
 FAR = {"furuta": 0.4, "linear": 0.05}
@@ -125,7 +125,10 @@ class Played:
             if math.isfinite(lane.stopped) or math.isfinite(lane.fell):
                 continue
             drive, pendulum = stills[i]
-            if drive.sees(away[i][0], away[i], commands[i]) or pendulum.sees(away[i]):
+            if drive.sees(away[i][0], away[i], commands[i]):
+                what = "the drive, which moves nothing" if watch.weak(i) else "an encoder that shows not a single count"
+                lane.stopped, lane.why = t, what
+            elif pendulum.sees(away[i]):
                 lane.stopped, lane.why = t, "an encoder that shows not a single count"
             elif says[i]:
                 lane.stopped, lane.why = t, str(watch.suspicions[int(best[i])])

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from upright.control.still import StillDrive
 from upright.errors import RigStopped
 from upright.laws import state_feedback
 from upright.records import Record
 from upright.rigs import Board, Capabilities, Fault, Limits, Mode, SelfTest, Tick
-from upright.rigs.driven import StillDrive
 from upright.rigs.replay import ReplayPort
 from upright.rigs.supervisor import Duty, Supervisor, unlike
 from upright.rigs.twin import BrokenEncoders

@@ -8,12 +8,12 @@ from dataclasses import replace
 import pytest
 
 from tests.rigs.test_supervisor import DUTY, LAW, MODEL, RIG, Scene
+from upright.control.still import LEAST_SWUNG, SWUNG, UNSEEN, WITHIN, StillDrive, StillPendulum
 from upright.control.watch import HELD_BY, sticking
 from upright.errors import RigStopped
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
-from upright.rigs.driven import LEAST_SWUNG, SWUNG, UNSEEN, WITHIN, StillDrive, StillPendulum
 
 T = RIG.period
 RHO = MODEL.B[1, 0] / MODEL.B[3, 0]

@@ -49,11 +49,11 @@ TAIL, RELATIVE = 2.0, 0.1
 """Degrees of freedom of the disturbances, and the size of what the model has wrong, over the largest witness."""
 LEVEL = math.radians(0.2)
 """Lean that nobody asks about [rad]."""
-HELD_BY, DRY = 2.0, 0.01
+HELD_BY, DRY = 2.0, 0.003
 """A body is held at most by so many times the dry friction that the model knows of; where it knows of none, by such a
 share of the largest command."""
 BOUNDS = {
-    ("body", 0.0): 5.0, ("body", -1.0): 6.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
+    ("body", 0.0): 8.0, ("body", -1.0): 6.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
     ("body", 4.0): 20.0, ("other", 0.0): 12.0, ("other", -1.0): 7.0, ("other", 0.25): 19.0, ("other", 0.5): 19.0,
     ("other", 2.0): 5.5, ("other", 4.0): 7.0, ("drive", 0.25): 4.6, ("drive", 0.5): 4.6,
 }  # fmt: skip
@@ -246,8 +246,11 @@ class Watch:
         self._lean((parts[2] + parts[3] - parts[0] - parts[1]) / self._kappa)
         self._mean += self._slow * (parts - self._mean)
         costs = self._costs(parts - self._mean)
+        gained = costs[0] - costs[1:]
+        gained[0] = self._dead(parts)
         self.odds *= self._memory
-        self.odds += self._weight * (costs[0] - costs[1:])
+        self.odds += self._weight * gained
+        self.odds[0] = np.maximum(0.0, self.odds[0])  # of a counter that moved a moment ago nothing is held against it
         lean = np.abs(place[1])
         ranked = np.sort(self.odds, axis=0)
         beyond = (self.odds > self._bounds).any(axis=0)
@@ -282,14 +285,30 @@ class Watch:
             shown = np.minimum(1.0, np.abs(body * other))
             costs = at_body(shown * (x - strength * Z), shown) + at_other(shown * (y - x))
         # what shows nothing says nothing, but for what it shows all the same
-        dead = np.minimum(at_body(Y - Z), at_other(Y - Z)) + _surprise(of_body / self._of_body)
-        costs = np.where(body == 0.0, dead, costs)
         costs = np.where(other == 0.0, at_body(of_body - Z) + _surprise(of_other / self._of_other), costs)
         return np.vstack([at_body(X - Z) + at_other(Y - X), costs])
+
+    def _dead(self, parts: Array) -> Array:
+        """Logarithm of the odds of this look, shape (lanes,), that the body's encoder is dead.
+
+        Slow motions count too, for without it a body drifts: where pendulum and command agree that it is accelerated,
+        and it shows nothing. A hand that leans on the pendulum parts these two, and friction is no excuse for either.
+        """
+        of_body, by_other, of_other, by_body, Z = parts
+        X, Y = of_body + by_other, of_other + by_body
+        far = self._of_other + RELATIVE * np.abs(np.array([X, Y, Z])).max(axis=0)
+        free = np.maximum(0.0, np.abs(X - Z) - self._friction) / (far + 0.25 * self._friction)
+        sound = _surprise(free) + _surprise((Y - X) / far)
+        return sound - _surprise((Y - Z) / far) - _surprise(of_body / self._of_body)
 
     def speaks(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Whether the drive is to be switched off after the last reading, and for which suspicion, lane by lane."""
         return self._says, self._best
+
+    def weak(self, lane: int = 0) -> bool:
+        """Whether a body that shows nothing is likelier driven by too little than read by a dead encoder."""
+        drive = len(self.odds) - len(STRENGTHS)
+        return bool(self.odds[drive:, lane].max() > self.odds[0, lane] + LEADS)
 
     def likely(self, lane: int = 0) -> tuple[Suspicion, ...]:
         """What may be wrong, likeliest first, as far as one is not plainly less likely than the next; none where all

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from upright.control.still import StillDrive, StillPendulum
 from upright.control.watch import Suspicion, Watch
 from upright.rig import Rig
-from upright.rigs.driven import StillDrive, StillPendulum
 from upright.rigs.protocol import Fault
 
 
@@ -33,6 +33,11 @@ class Doubts:
         self._watch.see([away], command)
         for still, held in ((self._drive.sees(readings[self._drive.which], away, command), self._drive),
                             (self._pendulum.sees(away), self._pendulum)):  # fmt: skip
+            if still and held is self._drive and self._watch.weak():
+                return Fault.MODEL, (
+                    f"{held.name} does not move as its command must have moved it; likeliest is that the drive gives "
+                    "too little, or something holds it fast. Check supply, cable and current limit."
+                )
             if still:
                 moved = "its command must have moved it" if held is self._drive else "what carries it was accelerated"
                 return Fault.ENCODER, (

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,6 +26,7 @@ from upright.rig import Rig
 from upright.rigs.board import Board, fault_text
 from upright.rigs.doubts import Doubts
 from upright.rigs.law import RunningLaw, absurdity, for_rig
+from upright.rigs.obedience import LOOKED, energy_risen
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
 from upright.rigs.tick_length import TickLength
 from upright.rigs.twin import TwinPort
@@ -39,6 +41,9 @@ PULSE = 0.15
 """Length of the pulse [s]."""
 REST = 0.5
 """Time without a count after which a rig is at rest [s]."""
+
+UNSEEING = Fault.ENCODER | Fault.MODEL | Fault.STALE | Fault.LINK
+"""Faults after which the readings do not tell whether the rig still moves."""
 
 Event = Callable[[float, str, str], None]
 
@@ -346,9 +351,26 @@ class Supervisor:
 
     def _give_up(self, fault: Fault, why: str) -> None:
         self.rig.estop()
+        if self._running is not None and not fault & UNSEEING and self._still_driven():
+            fault |= Fault.MODEL
+            why += " It gains energy at zero command: if it moves on, the drive does not obey; hit the button."
         self.faults |= fault
         self.event(self._time, "fault", why)
         raise RigStopped(why)
+
+    def _still_driven(self) -> bool:
+        """Whether the rig gains energy after its command went to zero."""
+        model, self._running = self.duty.model, None
+        if model is None or self.about.replayed:
+            return False
+        zero = model.plant.equilibrium(self.duty.zero or None)
+        offset = np.array([zero[c.name] for c in model.plant.coordinates])
+        ticks: list[Tick] = []
+        with suppress(RigStopped):  # a rig that does not answer shows nothing
+            for _ in range(round(LOOKED / self.about.period)):
+                ticks.append(self.rig.exchange(0.0))
+        q = np.array([self.readings(tick) for tick in ticks]).reshape(len(ticks), len(offset)) + offset
+        return energy_risen(model, [tick.time for tick in ticks], q)
 
     def _await_rest(self, patience: float = 30.0) -> None:
         """Wait with the power stage off, so that nothing drives what is still moving."""

@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from upright.control.watch import held_by
 from upright.rig import Rig
 
-UNSEEN = 40
-"""A driven body cannot have moved by so many counts without its encoder showing one."""
+UNSEEN, EXCESS, FOR = 40, 0.5, 0.1
+"""A driven body cannot have moved by so many counts without its encoder showing one; nor as far as half of what holds
+it at most takes it in so long [s], since a hand and friction of the day may be so much more."""
 SWUNG, LEAST_SWUNG = 0.05, 12
 """Nor a pendulum by such an angle [rad], and by so many counts."""
 WITHIN = 0.3
@@ -34,7 +35,7 @@ class StillDrive:
         self._pull = [float(a) for a in linear.A[row, 0::2]]
         self._drive, self._period = float(linear.B[row, 0]), model.period
         self._held = held_by(model, at)
-        self._least = UNSEEN / model.per_unit[self.which]
+        self._least = max(UNSEEN / model.per_unit[self.which], EXCESS * self._held * FOR**2 / 2)
         self._shown, self._speed, self._way = math.nan, 0.0, 0.0
 
     def sees(self, reading: float, away: Sequence[float], command: float) -> bool:
