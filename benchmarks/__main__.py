@@ -28,7 +28,7 @@ from upright.workers import Workers
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
-    "workers", "long", "gpu", "crash", "safety", "false_stops", "minute", "soak", "jitter", "gym", "at_hand",
+    "workers", "long", "gpu", "crash", "safety", "false_stops", "minute", "images", "soak", "jitter", "gym", "at_hand",
     "first", "kept", "strangers", "live", "mutants",
 )  # fmt: skip
 APART = ("mutants",)
