@@ -136,10 +136,10 @@ def _let_go(start: Start | float, rig: Path, *, law: bool) -> float:
     last, unit = model.states[-2], model.state_units[-2]
     if not start:
         return math.radians(TAP) if unit == "rad" else 1e-3 * TAP
-    deviations = read_start(start, model.states, model.state_units)
-    if any(value for name, value in deviations.items() if name != last):
+    start_state = read_start(start, model.states, model.state_units)
+    if any(value for name, value in start_state.items() if name != last):
         raise BadInput(f'the hand of a twin lets go of {last} at rest; --start takes its deviation, such as "5 deg".')
-    return deviations.get(last, 0.0)
+    return start_state.get(last, 0.0)
 
 
 @command(
