@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.hazards.abreast import Twins
+from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.sound import MAKES, Breaking, Lane, Played
 from benchmarks.measure import Line, Target, page
 from upright.rig.makes import make_rig
@@ -39,7 +39,7 @@ def _shown(channel: int, factor: float, twins: Twins, t: float) -> None:
 
 def _slips(channel: int, counts: float, twins: Twins, t: float) -> None:
     if t >= AFTER:
-        twins.slipped[channel] = counts * (t - AFTER) * twins.quantum[channel]
+        twins.slipped[channel] = counts * (t - AFTER) * twins.resolution[channel]
 
 
 def _supply(share: float, twins: Twins, t: float) -> None:

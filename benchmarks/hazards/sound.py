@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.hazards.abreast import Twins
+from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.story import POLES
 from upright.control.still import StillDrive, StillPendulum
 from upright.control.watch import Watch

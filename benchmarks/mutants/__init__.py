@@ -120,8 +120,7 @@ def table(
     lines.append(_share("all", [o.noticed for o in counted], asked=True, note=note))
     slowly = {o.change: o for o in by_slow or ()}
     if by_slow is not None:
-        known = [o for o in counted if o.noticed or o.change in slowly]
-        both = [o.noticed or slowly[o.change].noticed for o in known]
+        both = [o.noticed or (o.change in slowly and slowly[o.change].noticed) for o in counted]
         lines.append(_share("all, by quick and slow tests", both, asked=True, note=note))
     missed = sorted((o for o in counted if not o.noticed), key=lambda o: (o.change.path, o.change.place.line))
     return lines + [

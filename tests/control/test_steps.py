@@ -157,3 +157,15 @@ def test_a_change_of_one_encoder_step_is_none():
     with pytest.raises(BadInput, match="nothing stepped"):
         step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=1.0, resolution=0.5)
     assert step_figures(np.arange(20.0), np.full(20, -0.5), before=0.0, reference=-1.0, resolution=0.49).change == -0.5
+
+
+def test_an_error_that_passes_through_zero_settles_where_its_line_enters_the_band():
+    """From 0.2 above at 0.1 s to 0.02 below at 0.2 s: 5 % is reached after (0.2 - 0.05)/0.22 of that sample."""
+    t = 0.1 * np.arange(20)
+    y = np.ones(20)
+    y[:3] = 0.0, 1.2, 0.98
+    found = step_figures(t, y, before=0.0, reference=1.0)
+    assert found.settling_5 == pytest.approx(0.1 + 0.1 * 0.15 / 0.22)
+    assert found.settling_2 == pytest.approx(0.1 + 0.1 * 0.18 / 0.22)
+    y[2] = 1.02  # from the same side, as before: to the band's edge after 0.15 of 0.18
+    assert step_figures(t, y, before=0.0, reference=1.0).settling_5 == pytest.approx(0.1 + 0.1 * 0.15 / 0.18)

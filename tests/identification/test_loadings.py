@@ -40,6 +40,23 @@ def test_the_line_gives_what_was_put_in(campaign):
     assert "A line explains all 4 loadings" in found.verdict
 
 
+@pytest.mark.parametrize(
+    ("share", "resolution", "seen"),
+    [(0.04, 1e-6, 1), (0.06, 1e-6, 2), (0.3, 5e-4, 2), (0.3, 8e-4, 1), (0.5, 8e-4, 2)],
+)
+def test_a_step_is_at_rest_below_a_twentieth_of_the_log_or_twenty_counts(share, resolution, seen):
+    """Two swings, 38 mm from peak to trough and a share of that: 5 % of it is 1.9 mm, 20 counts of 0.8 mm are 16."""
+    t = np.arange(2000) * 1e-3
+    one = 0.02 * np.exp(-0.8 * t) * np.cos(25 * t)
+    both = np.concatenate([one, share * one])
+    log = Record(
+        t=np.arange(4000) * 1e-3, signals={"x": both, "u": np.repeat([0.0, 1.0], 2000)}, inputs=("u",), outputs=("x",)
+    )
+    found = swings(log, added=0.0, label="log", signal="x", command="u", resolution=resolution)
+    assert [s.label for s in found] == ["log, step 0", "log, step 1"][:seen]
+    assert found[0].decay.omega_d == pytest.approx(25.0, rel=1e-2)
+
+
 @pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     clean = {a: swing(BARE + a, K, C, F, x0=0.02)[:2] for a in (0.0, 0.5, 1.0, 2.0)}

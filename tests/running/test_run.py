@@ -385,3 +385,20 @@ def test_a_start_beyond_the_window_of_a_run_is_refused_by_its_size(folder, tmp_p
     with pytest.raises(BadInput, match=r"begins within 10 deg of it, and --start is 12 deg"):
         run_rig(late, tmp_path)
     assert run_rig(replace(late, tilt=math.radians(9.9)), tmp_path).end.ticks > 0
+
+
+@pytest.mark.parametrize("name", ["bench 3", ""])
+def test_a_rig_is_called_by_its_file_where_a_make_alone_describes_it_too(tmp_path, name):
+    (tmp_path / "RIG.toml").write_text(
+        'kind = "twin"\nmake = "furuta"\n' + (f'name = "{name}"\n' if name else ""), encoding="utf-8"
+    )
+    model, truth = model_and_truth(read_rig_file(tmp_path / "RIG.toml"))
+    assert model.name == (name or make_rig("furuta").name)
+    assert truth.name == make_rig("furuta").name
+
+
+@pytest.mark.parametrize(("start", "degrees"), [("", 3.0), ("0 deg", 0.0), ("5 deg", 5.0)])
+def test_a_twin_begins_off_upright_unless_somebody_says_otherwise(folder, tmp_path, start, degrees):
+    answer = up.run(folder / "RIG.toml", law=folder / "design.json", duration=0.1, start=start, out=tmp_path)
+    log, target = answer.value.log, answer.value.end.target
+    assert log.columns["theta"][0] - target[1] == pytest.approx(math.radians(degrees), abs=2 * math.pi / 2000)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -26,6 +28,26 @@ from upright.verbs import log as verbs
 )
 def test_windows_are_told_with_their_share_of_the_record(parts, sentence):
     assert window_sentence(parts, 0.0, 50.0) == sentence
+
+
+def part_of(file, role, first, last, record):
+    """A run that is a part of a log, whose source has the log's hash and what was done to it behind the name."""
+    return SimpleNamespace(
+        source=f"{file} (sha256 12ab); window {first} to {last}", role=role, t=np.array([first, last]), record=record
+    )
+
+
+def test_parts_of_one_log_are_told_together_and_every_log_by_its_name():
+    """10 of 40 s and 8 of 20 s."""
+    runs = [
+        part_of("a.csv", "fit", 0.0, 4.0, (0.0, 40.0)), part_of("b.csv", "predict", 2.0, 10.0, (0.0, 20.0)),
+        part_of("a.csv", "predict", 6.0, 12.0, (0.0, 40.0)),
+    ]  # fmt: skip
+    assert windows(runs) == (
+        "a.csv: fits 0 to 4 s and predicts 6 to 12 s, 25 % of the record.",
+        "b.csv: predicts 2 to 10 s, 40 % of the record.",
+    )
+    assert windows(runs[::2]) == ("Fits 0 to 4 s and predicts 6 to 12 s, 25 % of the record.",)
 
 
 def crane_like(t):

@@ -374,11 +374,13 @@ def _passed(t: Array, share: Array, level: float) -> float:
 
 def _settled(t: Array, share: Array, band: float, tail: int) -> float:
     """After which it stays in the band; inf unless it is seen to stay there for as long as the rest was taken from."""
-    off = np.abs(share - 1.0)
+    error = share - 1.0
+    off = np.abs(error)
     outside = np.flatnonzero(off > band * (1 + 1e-9))
     if outside.size == 0:
         return 0.0
     i = int(outside[-1])
     if i + 1 > t.size - tail:
         return math.inf
-    return float(t[i] + (t[i + 1] - t[i]) * (off[i] - band) / (off[i] - off[i + 1]))
+    inwards = off[i] - np.sign(error[i]) * error[i + 1]  # through zero, where the next sample lies on the other side
+    return float(t[i] + (t[i + 1] - t[i]) * (off[i] - band) / inwards)

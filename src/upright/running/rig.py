@@ -35,7 +35,8 @@ def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
     """The rig as it is known, and the one that a twin of it truly is."""
     if file.known is None:
         make = make_named(file.make, option="make")
-        return make_rig(make.key), make_rig(make.key, file.seed)
+        model, truth = make_rig(make.key), make_rig(make.key, file.seed)
+        return (replace(model, name=file.name), truth) if file.name else (model, truth)
     known = read_stored_rig(file.known, seed=file.seed)
     model = completed(known, vendor=file.vendor, who="a run on a rig", form="")
     truth = model

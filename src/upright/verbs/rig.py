@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -74,7 +75,8 @@ def run(
     mode : str
         ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
     start : str or mapping, optional
-        Deviation of the last coordinate when the hand of a twin lets go, ``"5 deg"``; a number is [rad or m].
+        Deviation of the last coordinate when the hand of a twin lets go, ``"5 deg"``; a number is [rad or m]. Under a
+        law 3 degrees, or 3 mm, when omitted, so that there is something to see.
     check : bool
         Compare a small pulse with the model first.
     watch : bool
@@ -103,10 +105,11 @@ def run(
     from upright.running.run import RunRequest, run_rig
 
     folder = page_folder(out, pdf)
+    leaning = _let_go(start, path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
         excite=excite, reference=reference, seconds=duration,
-        mode=mode, tilt=_let_go(start, path_of(rig, "the rig that runs")), check=check, watch=watch, accept=accept,
+        mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
     )  # fmt: skip
     result = run_rig(request, folder, watch=observe)
     written = run_chapter(result)
@@ -114,19 +117,29 @@ def run(
     return Answer(result, written, [*([result.log_path] if result.log is not None else []), *page])
 
 
-def _let_go(start: Start | float, rig: Path) -> float:
+TAP = 3.0
+"""Degrees, or millimetres, from which a twin starts under a law where nobody says, for something to be seen."""
+
+
+def _let_go(start: Start | float, rig: Path, *, law: bool) -> float:
     """Deviation of the last coordinate [SI], at rest and the others in the middle, as a hand lets go."""
-    if start == "" or isinstance(start, int | float):
-        return float(start or 0.0)
+    if isinstance(start, int | float):
+        return float(start)
+    from upright.basis import SIMULATED
     from upright.rigs.rigfile import read_rig_file
     from upright.running.rig import model_and_truth
 
-    model, _ = model_and_truth(read_rig_file(rig))
-    found = read_start(start, model.states, model.state_units)
-    last = model.states[-2]
-    if any(value for name, value in found.items() if name != last):
+    file = read_rig_file(rig)
+    if not start and not (law and file.performed == SIMULATED):
+        return 0.0
+    model, _ = model_and_truth(file)
+    last, unit = model.states[-2], model.state_units[-2]
+    if not start:
+        return math.radians(TAP) if unit == "rad" else 1e-3 * TAP
+    start_state = read_start(start, model.states, model.state_units)
+    if any(value for name, value in start_state.items() if name != last):
         raise BadInput(f'the hand of a twin lets go of {last} at rest; --start takes its deviation, such as "5 deg".')
-    return found.get(last, 0.0)
+    return start_state.get(last, 0.0)
 
 
 @command(

@@ -32,7 +32,7 @@ OFFSET = "actuator.offset"
 FELT = 0.05
 """Share of the cost that it must take away to first order before it is fitted."""
 
-SEEN = 2.0
+SHOWN = 2.0
 """Standard errors from which on it counts as there: one right model in twenty then has intervals that are too wide."""
 
 FITTED = 8
@@ -84,12 +84,12 @@ def neglected(best: Optimum) -> Neglected | None:
     curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
     if not curvature > 0 or not slope**2 > FELT * here.cost * curvature:
         return None
-    found = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-4, limit=FITTED)
-    if found.interrupted:
+    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-4, limit=FITTED)
+    if end.interrupted:
         raise KeyboardInterrupt
-    there = assess(wider, found.x)
+    there = assess(wider, end.x)
     size = estimate(there, x.size)
-    if there.lost or not abs(size.value) > SEEN * size.stderr:
+    if there.lost or not abs(size.value) > SHOWN * size.stderr:
         return None
     shared = [i for i in best.shared if not problem.unknowns[i].name.startswith(NOISE)]
     intervals = {problem.unknowns[i].name: beside_bound(there, i).interval for i in shared}
@@ -99,11 +99,11 @@ def neglected(best: Optimum) -> Neglected | None:
     )  # fmt: skip
 
 
-def with_force(bands: Bands, found: Neglected) -> Bands:
+def with_force(bands: Bands, force: Neglected) -> Bands:
     """Bands that hold what the force does to a prediction, by itself and through the numbers that it moves."""
-    together: Mapping[str, float] = dict(zip(found.names, found.moves, strict=True))
-    step = np.append([together.get(n, 0.0) for n in bands.names], found.force.value)
+    together: Mapping[str, float] = dict(zip(force.names, force.moves, strict=True))
+    step = np.append([together.get(n, 0.0) for n in bands.names], force.force.value)
     C = np.zeros((step.size, step.size))
     C[:-1, :-1] = bands.covariance
-    C[-1, -1] = found.force.stderr**2
+    C[-1, -1] = force.force.stderr**2
     return replace(bands, names=(*bands.names, OFFSET), covariance=C + np.outer(step, step))

@@ -21,7 +21,7 @@ class PredictionCheck:
 def promise(
     runs: Mapping[str, RunScore], bands: Bands | None, fitted: Mapping[str, Mapping[str, float]] | None = None
 ) -> PredictionCheck:
-    """Whether predicted runs are met as well as a fit promises; what lies beyond what it has seen is told first.
+    """Whether predicted runs are met as well as a fit promises; extrapolations are reported first.
 
     Parameters
     ----------

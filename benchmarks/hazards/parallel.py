@@ -50,7 +50,7 @@ class Twins:
         self._point = first.plant.state("inverted")
         self.x: Array = np.repeat(self._point[:, None], lanes, axis=1)
         self._memory = np.empty(2 * (self.x.shape[0] + self._stepper.carried) * (lanes + 16))
-        self.quantum = 1.0 / np.array(first.per_unit)[:, None]
+        self.resolution = 1.0 / np.array(first.per_unit)[:, None]
         self.factor, self.slipped = np.ones((2, lanes)), np.zeros((2, lanes))
         """What a broken encoder shows of a motion, and by how much it has slipped."""
         self.supply = np.ones(lanes)
@@ -83,7 +83,7 @@ class Twins:
             self._true, self._shown = true, true.copy()
         self._shown = self._shown + self.factor * (true - self._true)
         self._true = true
-        return np.floor((self._shown + self.slipped) / self.quantum + 0.5) * self.quantum
+        return np.floor((self._shown + self.slipped) / self.resolution + 0.5) * self.resolution
 
     def lift(self, tilts: Sequence[float]) -> None:
         """A hand holds each pendulum leaning [rad], and the law begins."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.hazards.abreast import Twins
+from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.sound import law_for
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
