@@ -16,8 +16,6 @@ from upright.live.twin import LONGEST_DELAY
 from upright.physics import Plant
 from upright.report.html import rendered
 
-_COLOURS = ("var(--q0)", "var(--q1)", "var(--q2)", "var(--q3)")
-
 
 def page(
     data: Mapping[str, Any],
@@ -88,10 +86,10 @@ def still(plant: Plant, q: Sequence[float]) -> tuple[str, str]:
         across = x * np.cos(turned) + y * np.sin(turned)
         down = -(z * np.cos(raised) + (y * np.cos(turned) - x * np.sin(turned)) * np.sin(raised))
         places = " ".join(f"{a:.5g},{b:.5g}" for a, b in zip(across, down, strict=True))
-        colour = _COLOURS[names.index(name) % 4] if name else "var(--line-strong)"
+        kind = f"q{names.index(name) % 4}" if name else "fixed"
         width = far * 2.2 / 100 * (1.8 if name else 0.7)
         drawn.append(
-            f'<polyline points="{places}" fill="none" stroke="{colour}" stroke-width="{width:.4g}"'
+            f'<polyline class="{kind}" points="{places}" fill="none" stroke-width="{width:.4g}"'
             ' stroke-linecap="round" stroke-linejoin="round"/>'
         )
     return f"{-1.1 * far:.4g} {-1.15 * high:.4g} {2.2 * far:.4g} {2.3 * high:.4g}", "".join(drawn)
