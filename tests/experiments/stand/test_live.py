@@ -132,7 +132,7 @@ def test_what_is_no_rig_at_hand_is_refused(tmp_path):
     with pytest.raises(BadInput, match="there is one rig, as it is"):
         up.lab(rig=str(tmp_path / "RIG.toml"), nonideal=True, out=tmp_path / "out")
     (tmp_path / "run.csv").write_text("t,u,psi,theta\n0,0,0,0\n0.001,0,0,0\n", encoding="utf-8")
-    with pytest.raises(BadInput, match="a replay answers nothing"):
+    with pytest.raises(BadInput, match="a replay does not answer commands"):
         made(tmp_path, 'kind = "replay"\nmake = "furuta"\nrecord = "run.csv"\n')
 
 
@@ -178,9 +178,9 @@ def test_a_law_from_a_fit_that_is_not_trusted_is_not_armed_on_hardware_without_a
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     (tmp_path / "RIG.toml").write_text(SERIAL, encoding="utf-8")
-    described = run_module.described
+    model_and_truth = run_module.model_and_truth
     monkeypatch.setattr(
-        run_module, "described", lambda file: tuple(r.replace(basis=UNTRUSTED) for r in described(file))
+        run_module, "model_and_truth", lambda file: tuple(r.replace(basis=UNTRUSTED) for r in model_and_truth(file))
     )
     live = live_stand(tmp_path / "RIG.toml", lambda _sentence: True, accept=accept)
     law = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.zeros((1, 2)), period=2e-3)

@@ -84,7 +84,7 @@ def test_a_step_never_exceeds_its_share_of_the_limit(tmp_path, monkeypatch):
 
     monkeypatch.setattr(LiveStand, "run", run)
     rig = replace(live_stand(tmp_path / "RIG.toml"), person=lambda _sentence: len(levels) < 2)
-    with pytest.raises(RigStopped, match="asked for and not done"):
+    with pytest.raises(RigStopped, match="requested and not done"):
         step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
     probe, level = levels
     assert probe == pytest.approx(PROBE * 4.0)
@@ -139,7 +139,7 @@ def test_a_person_is_asked_for_every_loading_by_the_owners_words(tmp_path):
         return len(asked) < 2
 
     rig = replace(made(tmp_path), person=person)
-    with pytest.raises(RigStopped, match=r"asked for and not done: .*0 kg in all"):
+    with pytest.raises(RigStopped, match=r"requested and not done: .*0 kg in all"):
         step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
 
 
