@@ -68,7 +68,10 @@ def test_a_command_without_a_limit_is_warned_of(tmp_path):
     (tmp_path / "model.toml").write_text(MODEL)
     asked = ("--matrices", tmp_path / "model.toml", "--poles", "-4+-2j", "--period", "5 ms", "-o", tmp_path)
     upright("design", *asked)
-    assert "limits none" in upright("export", tmp_path, "--to", "c", "-o", tmp_path).stdout
+    assert (
+        "Warning: The command's limit is not specified"
+        in upright("export", tmp_path, "--to", "c", "-o", tmp_path).stdout
+    )
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ def test_no_disk_is_as_wide_as_a_room(here, radius):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ("--poles=0,-2,-3,-4 --period=1ms", "a pole is asked where the model has one already"),
+        ("--poles=0,-2,-3,-4 --period=1ms", "a pole is to be where the model has one already"),
         ("--poles=-1,-2,-3,-4 --period=0s", "every 1e-6 to 10 s"),
         ("--poles=-1,-2,-3,-4 --period=1e300s", "every 1e-6 to 10 s"),
         ("--lqr 1,1,1,1 --period=1ms --limit 1e300", "above 0 and below 1e9"),

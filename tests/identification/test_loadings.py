@@ -228,4 +228,4 @@ def test_a_bare_inertia_that_may_be_nothing_is_said():
     swung = [by_hand(a, ((0.01 + a) / 4) ** -0.5, 0.1 * ((0.01 + a) / 4) ** -0.5) for a in (1.0, 2.0, 3.0)]
     found = fit_loadings(swung)
     assert found.bare.interval[0] <= 0
-    assert found.verdict.startswith("The bare body's inertia cannot be told from nothing")
+    assert found.verdict.startswith("The bare body's inertia cannot be distinguished from zero")

@@ -132,7 +132,7 @@ def elsewhere(tmp_path, monkeypatch):
         (lambda: up.chance(FURUTA, [0, 0, 0, 0], seconds=0.0), "more than 0 and at most 120 s, got 0 s"),
         (lambda: up.chance(FURUTA, [0, 0, 0, 0], seconds=120.1), "at most 120 s, got 120.1 s"),
         (lambda: up.chance(FURUTA, [0, 0, 0, 0], draws=0), "at least 1, got 0"),
-        (lambda: up.chance(FURUTA, [0, 0, 0, 0], counts=[1, 2, 3]), "counts needs 2 numbers, .* got 3"),
+        (lambda: up.chance(FURUTA, [0, 0, 0, 0], counts=[1, 2, 3]), r"one for each of psi, theta, .* got \[1, 2, 3\]"),
     ],
 )  # fmt: skip
 def test_what_lies_just_beyond_is_refused_before_the_work_begins(call, said, tmp_path):

@@ -76,7 +76,7 @@ PRINTED = "concept,pre,post\nfeedback,2,3\n"
     [
         ({"n": 1}, "at least 2, got 1"), ({}, "say with --n how many answers"),
         ({"n": 9, "scale": "4-4"}, "its two ends"),
-        ({"n": 9, "scale": "1"}, "its two ends"), ({"n": 9, "scale": "1-100"}, "its two ends"),
+        ({"n": 9, "scale": "1"}, "its two ends"), ({"n": 9, "scale": "1-1000"}, "its two ends"),
     ],
 )  # fmt: skip
 def test_a_survey_needs_two_answers_and_two_ends(options, said, tmp_path):
