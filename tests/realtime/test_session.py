@@ -200,6 +200,15 @@ def test_the_state_of_a_run_counts_from_its_first_tick(tmp_path):
     assert [s.time for s in running] == pytest.approx([k * RIG.period for k in range(1, len(running) + 1)])
 
 
+@pytest.fixture
+def heard():
+    """Ctrl-C interrupts, also where the tests were started by a shell that ignores it in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 def test_a_second_interrupt_while_the_rig_is_zeroed_does_not_lose_the_end(tmp_path):
     class Impatient(TwinPort):
         """Somebody presses Ctrl-C twice: in the loop, and while the power stage is switched off for it."""
