@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.boards import COUNTS, FULL_SCALE, Board
 from upright.errors import BadInput
-from upright.rigs.firmware import BOARDS, board_of, build_image, ceilings_of, sources
+from upright.rigs.firmware import BOARDS, board_of, build_image, ceilings_of
 from upright.rigs.firmware import images as images_of
 from upright.rigs.protocol import Limits
 
