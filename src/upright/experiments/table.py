@@ -135,13 +135,16 @@ def _regulation(at: ExperimentInput) -> tuple[Chapter, bool]:
 def _swing_up(at: ExperimentInput) -> tuple[Chapter, bool]:
     from upright.experiments.swing_up_2b.chapter import chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up
+    from upright.files import write_json
 
     stand = at.stand.described_by(at.fit, at.folder)
     known, model = _identified(at, stand)
     result = run_swing_up(
         model, stand, at.folder, at.progress, at.stopped, known=known_of(known), source=typed(at.fit)
     )  # fmt: skip
-    return chapter(result), not at.stopped()
+    page = chapter(result, typed(at.folder))
+    write_json(at.folder / "swing_up.json", page.numbers)
+    return page, not at.stopped()
 
 
 def _tracking(at: ExperimentInput) -> tuple[Chapter, bool]:

@@ -173,7 +173,8 @@ def test_the_pole_of_a_balanced_pendulum_lies_in_its_interval(seed: int) -> None
     assert pole.interval[0] <= truth <= pole.interval[1]
     assert pole.stderr < 0.05 * truth
     ahead = fit.runs[f"seed {seed}"].ahead
-    assert list(ahead) == [0.05, 0.2]
+    assert {0.05, 0.2} <= ahead.keys()  # those requested; the one that the start state allows may be another
+    assert list(ahead) == sorted(ahead)
     assert all(ahead[0.05][c] > ahead[0.2][c] for c in ("psi", "theta"))  # the further, the harder
 
 

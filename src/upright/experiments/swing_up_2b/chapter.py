@@ -22,8 +22,8 @@ QUESTION = (
 )
 
 
-def chapter(result: SwingUpRun) -> Chapter:
-    """Sensors, swing-up, lies; as far as the experiment has them."""
+def chapter(result: SwingUpRun, folder: str = "FOLDER") -> Chapter:
+    """Sensors, swing-up, lies; as far as the experiment has them. Its numbers lie in swing_up.json in the `folder`."""
     source = "numbers identified hanging" if result.source else "the nominal numbers of the rig model"
     seed = "" if result.truth is result.model else f", seed {result.truth.seed}"
     parts = [_sensor_part(result.model, result.check)]
@@ -35,7 +35,7 @@ def chapter(result: SwingUpRun) -> Chapter:
         key="2b", title=f"Swing-up and catch: {result.truth.name}{seed}", question=QUESTION,
         verdict=result.verdict,
         detail=f"Law and check were made from {source}; they met a rig with numbers of its own.",
-        sound=result.sound, parts=tuple(parts), steps=_steps(result), findings=_findings(result),
+        sound=result.sound, parts=tuple(parts), steps=_steps(result, folder), findings=_findings(result),
         numbers=_numbers(result),
     )  # fmt: skip
     return resting_on(page, result.model.basis, result.performed)
@@ -160,7 +160,7 @@ def _findings(result: SwingUpRun) -> tuple[KeyNumber, ...]:
     )
 
 
-def _steps(result: SwingUpRun) -> tuple[Step, ...]:
+def _steps(result: SwingUpRun, folder: str) -> tuple[Step, ...]:
     """What to do next."""
     base = f"upright swing-up {result.source or f'--rig {make_of(result.truth.plant).key}'} --seed {result.truth.seed}"
     if not result.check.sound:
@@ -170,7 +170,7 @@ def _steps(result: SwingUpRun) -> tuple[Step, ...]:
         out.append(Step("Allow more travel.", f"{base} --travel {2 * result.law.travel:g}"))
     else:
         out.append(Step("Take the law to the computer that closes the loop, in C, for Arduino or in Python.",
-                        "upright export FOLDER/swing_up.json --to c"))  # fmt: skip
+                        f"upright export {folder}/swing_up.json --to c"))  # fmt: skip
     if not result.source:
         out.append(Step("Design from an identification instead of the data sheet.",
                         f"upright swing-up FIT.json --seed {result.truth.seed}"))  # fmt: skip

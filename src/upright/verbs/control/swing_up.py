@@ -90,6 +90,7 @@ def swing_up(
     from upright.experiments.swing_up_2b.chapter import chapter, check_chapter
     from upright.experiments.swing_up_2b.run import known_of, run_swing_up, scales_of_log
     from upright.files import write_json
+    from upright.report.symbols import typed
     from upright.rig.completion import completed, doubts, twin_of
     from upright.rig.hardware import driven_unit
     from upright.rig.makes import make_rig
@@ -122,7 +123,7 @@ def swing_up(
         return Answer(scales, page, write_page(page, at / "encoders.html", pdf))
     travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_faulty(truth, lie))
     result = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
-    page = chapter(result)
+    page = chapter(result, typed(at))
     page = replace(page, warnings=(*page.warnings, *doubt))
     return Answer(
         result, page, [*write_page(page, at / "swing_up.html", pdf), write_json(at / "swing_up.json", page.numbers)]
