@@ -67,6 +67,7 @@ def test_what_is_not_computed_with_is_left_alone(source):
     assert changed(source) == set()
 
 
+@pytest.mark.slow
 def test_changes_of_a_room_are_programs_of_another_meaning():
     """60 of them: each differs in one stretch of its file and in its syntax tree."""
     for change in drawn(ROOT, 60, seed=5, within="signals"):
@@ -180,6 +181,7 @@ def test_a_change_is_noticed_by_a_test_that_passes_without_it(tree, tmp_path):
     assert second.shown == "return x / 4 -> return x * 4"
 
 
+@pytest.mark.slow
 def test_a_change_that_never_ends_is_noticed(tree, tmp_path):
     watch = tree / "benchmarks/mutants/watch.py"
     text = watch.read_text(encoding="utf-8")

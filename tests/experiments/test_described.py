@@ -143,6 +143,7 @@ def test_a_design_without_a_limit_says_that_none_is_known(tmp_path):
         design(tmp_path / "rig.toml", poles=POLES, speed="kalman")
 
 
+@pytest.mark.slow
 def test_a_force_limit_is_in_the_loop_that_is_simulated(study, tmp_path):
     """1.5 N/V and 6 N: beyond 4 V the drive gives no more, and the motion is that under a command of at most 4 V."""
     source = study(('lag = "4 ms"', 'force_limit = "6 N"'))
@@ -227,6 +228,7 @@ def test_a_fit_that_meets_another_seed_says_so(tmp_path, ran, another):
     assert any("another rig" in w and "seed 3" in w and "seed 4" in w for w in done.chapter.warnings) == another
 
 
+@pytest.mark.slow
 def test_a_rig_of_one_s_own_runs_on_one_that_its_fit_allows(tmp_path):
     path = fit_of(0, tmp_path)
     content = json.loads(path.read_text(encoding="utf-8"))

@@ -265,6 +265,7 @@ def test_what_was_recorded_of_a_run_and_is_sent_again_switches_nothing_on(host, 
         assert dead(board)
 
 
+@pytest.mark.slow
 def test_an_exchange_of_65536_ticks_ago_is_not_followed(host):
     """Their last 16 bits are those of now."""
     line = TerminalLine(host().port)

@@ -220,6 +220,7 @@ def test_separation_of_observer_and_gains():
     np.testing.assert_allclose(found, wanted, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_noise_of_the_command_is_what_a_long_run_shows():
     """White rounding errors through the loop by hand, against Lyapunov's equation."""
     model = UPRIGHT.to_sampled(0.01)

@@ -30,6 +30,7 @@ def test_a_page_of_an_answer_shows_itself_in_a_notebook_and_writes_nothing(tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_fit_plays(tmp_path):
     """A hanging swing, driven, of which limit and counts are given."""
     import numpy as np

@@ -11,6 +11,7 @@ from upright.verbs.course import lab, reproduce, survey
 TABLE_1_SET_1 = [-4.1484 + 1.6341j, -4.1484 - 1.6341j, -16.8545, -3.222]
 
 
+@pytest.mark.slow
 def test_printed_poles_come_again(tmp_path):
     found = reproduce()
     again = found.tables[0].again[0]

@@ -37,6 +37,7 @@ def fitted(method: str, at: int) -> tuple[Fit, Stopped]:
     return identify(rig(Pendulum, PENDULUM, GUESSES), runs, method=method, progress=stopped), stopped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_interrupt_at_any_call_ends_the_fit(method: str) -> None:
     whole, counted = fitted(method, 10**9)

@@ -29,6 +29,7 @@ def needs(board):
         pytest.skip(f"{', '.join(missing)} is missing")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("board", "drive"), EVERY, ids=lambda v: getattr(v, "name", v))
 def test_an_image_is_the_same_to_the_byte_each_time(board, drive, tmp_path):
     needs(board)
@@ -38,6 +39,7 @@ def test_an_image_is_the_same_to_the_byte_each_time(board, drive, tmp_path):
     assert str(tmp_path).encode() not in first
 
 
+@pytest.mark.slow
 def test_every_drive_has_an_image_of_its_own(tmp_path):
     for board in BOARDS.values():
         needs(board)
@@ -45,6 +47,7 @@ def test_every_drive_has_an_image_of_its_own(tmp_path):
         assert len(made) == len(board.drives)
 
 
+@pytest.mark.slow
 def test_a_wheel_has_all_that_an_image_is_built_from(tmp_path):
     with (ROOT / "pyproject.toml").open("rb") as file:
         listed = tomllib.load(file)["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]

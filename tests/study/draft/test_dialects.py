@@ -41,6 +41,7 @@ def met(tmp_path):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", PLACES)
 def test_a_log_in_degrees_millimetres_milliseconds_and_millivolts_is_the_same_study_to_the_last_bit(met, plant):
     """Its text has nine digits, of which those of a degree are others than those of a radian."""
