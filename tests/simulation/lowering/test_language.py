@@ -61,7 +61,10 @@ def arithmetic(OUT, a, b, n, m):
 @given(FLOATS, FLOATS, INTS, INTS)
 def test_arithmetic(a, b, n, m):
     x, y = both(arithmetic, 17, float(a), float(b), n, m)
-    assert np.allclose(x, y, rtol=1e-14, atol=0.0), np.flatnonzero(x != y)
+    close = np.isclose(x, y, rtol=1e-14, atol=0.0)
+    # terms of both signs may cancel (a = 30, b = 0); each is right to its own last bits
+    close[14] |= abs(x[14] - y[14]) <= 1e-14 * (3 + np.sqrt(abs(a)) + abs(np.tan(a)))
+    assert close.all(), np.flatnonzero(~close)
 
 
 def branches(OUT, n, x):
