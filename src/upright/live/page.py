@@ -25,6 +25,7 @@ def page(
     cautions: Sequence[str],
     share: str,
     numbers: Sequence[tuple[str, str, str]],
+    origin: str,
     start: str,
     seed: int,
 ) -> str:
@@ -42,6 +43,8 @@ def page(
         What becomes of the rigs that the fit allows, for paper and where no script runs.
     numbers : sequence of (str, str, str)
         Mark-up of symbols, meanings with units, values.
+    origin : str
+        Where the numbers of those rigs come from.
     start : str
         Where the rigs are let go.
     seed : int
@@ -63,7 +66,7 @@ def page(
         "upright.live", "play.html",
         policy=f"default-src 'none'; {allowed}",
         style=Markup(style), script=Markup(script), picture=Markup(picture), view=view, name=data["name"],
-        headline=headline, cautions=cautions, share=share, start=start, seed=seed,
+        headline=headline, cautions=cautions, share=share, origin=origin, start=start, seed=seed,
         numbers=[(Markup(mark), *rest) for mark, *rest in numbers],
         lanes=data["lanes"], seconds=f"{data['seconds']:g}", period=f"{1e3 * data['period']:.4g} ms",
         longest=f"{1e3 * LONGEST_DELAY:g}", driven=driven,

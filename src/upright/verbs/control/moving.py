@@ -136,6 +136,7 @@ def live_page(
         cautions=[c for c in (known.basis.first_line(), *blind, *doubts(known, rig)) if c],
         share=f"{_of_model(known.basis)}{held} of {draws} rigs are stabilised for {seconds:g} s.",
         numbers=_numbers(rig),
+        origin="drawn from the covariance of the fit" if known.draws else "with the same numbers",
         start=f"{math.degrees(let_go['theta']):.3g}° at {let_go['theta_dot']:.2g} rad/s", seed=seed,
     )  # fmt: skip
     return text, scored
