@@ -284,7 +284,8 @@ def fuzzed(which: tuple[int, int]) -> tuple[int, int, int]:
     parser, sent, accepted, wrong = wire.Parser(), set[bytes](), 0, 0
     for _ in range(number // 100):
         frames = [
-            wire.pack(rng.randrange(256), rng.randrange(256), rng.randbytes(rng.randrange(80))) for _ in range(100)
+            wire.pack(rng.randrange(256), rng.randrange(256), rng.randrange(65536), rng.randbytes(rng.randrange(80)))
+            for _ in range(100)
         ]
         sent = {frame[:-1] for frame in frames}
         stream = b"".join(_spoiled(frame, rng) for frame in frames) + b"\0"
