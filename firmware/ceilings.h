@@ -1,6 +1,7 @@
 /* The farthest that any host may let this rig go. A host narrows these and cannot widen them: what it asks for beyond
- * them is held to them, and told so. Set them for your rig, here or by -DCEILING_...; `upright firmware build RIG.toml`
- * takes them from its [limits]. In counts from where the encoders were zeroed, and in ticks of 1 ms. */
+ * them is held to them, and it reads them back. Set them for your rig, here or by -DCEILING_...;
+ * `upright firmware build --rig RIG.toml` takes them from its [limits]. In counts from where the encoders were zeroed,
+ * and in ticks of 1 ms. */
 #ifndef CEILINGS_H
 #define CEILINGS_H
 

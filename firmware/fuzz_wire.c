@@ -33,7 +33,7 @@ uint32_t port_boot(void) { return 0; }
 uint32_t port_lock(void) { return 0; }
 void port_unlock(uint32_t before) { (void)before; }
 
-static int16_t limit;    /* as the firmware told that it holds it */
+static int16_t limit;    /* as the firmware reported it */
 static uint16_t session; /* of its last answer */
 
 static void claim(bool held, const char *what) {
@@ -79,7 +79,7 @@ static size_t proper(uint8_t *payload, size_t n, uint32_t tick) {
     return HEAD + body[payload[0]];
 }
 
-/* The request of this kind, in the session that the firmware told last. */
+/* The request of this kind, in the session that the firmware reported last. */
 static void ask_now(uint8_t *payload, enum request kind, size_t n) {
     payload[0] = kind;
     put_u16(payload + 2, session);
