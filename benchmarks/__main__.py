@@ -108,7 +108,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--markdown", type=Path, metavar="FILE", help=f"write the page of one of {pages}")
     parser.add_argument("--starts", type=int, default=300, metavar="N", help="random starts of each study in `starts`")
     parser.add_argument(
-        "--workers", type=int, metavar="N", help=f"processes for {', '.join(SHARED)}; default 1; with --quick and for mutants 2"
+        "--workers",
+        type=int,
+        metavar="N",
+        help=f"processes for {', '.join(SHARED)}; default 1; with --quick and for mutants 2",
     )
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     changes = parser.add_argument_group("mutants")

@@ -221,8 +221,7 @@ def drive_column(record: Record, inspection: Inspection) -> Column | None:
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
-    named = _by_coordinates({bare_name(c.name) for c in places})
-    if named:
+    if named := named_after(places):
         return named, f"The columns are called as the coordinates of a {named}."
     lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
@@ -252,12 +251,13 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     return "pendulum", doubt
 
 
-def _by_coordinates(names: set[str]) -> str:
-    """The only plant whose coordinates have just these names; empty where there is none.
+def named_after(places: list[Column]) -> str:
+    """The only plant whose coordinates have just the names of these columns; empty where there is none.
 
     Of our own only those that carry a pendulum: theta and alpha are arm and pendulum of Quanser's QUBE as well as hub
     and link of a flexible one.
     """
+    names = {bare_name(c.name) for c in places}
     fitting = [n for n, plant in PLANTS.sound().items() if {c.name for c in plant.coordinates} == names]
     own = len(names) > 1 and names <= set(_COORDINATES)
     return fitting[0] if len(fitting) == 1 and (own or fitting[0] not in PLANTS.own) else ""
