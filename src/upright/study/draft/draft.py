@@ -126,5 +126,5 @@ def alike(record: Record, inspection: Inspection, recognised: Recognised) -> tup
     rest = [n for n in (recognised.plant, *others) if n != taken]
     shares_text = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in rest)
     remedy = f"--plant {best} drafts what explains them far better" if better and named else "--plant says which"
-    said = f"Taken for {taken}{reason}. Of the accelerations it explains {100 * shares[taken]:.0f} %"
-    return "" if taken == recognised.plant else taken, [f"{said}, {shares_text}: {remedy}."]
+    sentence = f"Taken for {taken}{reason}. Of the accelerations it explains {100 * shares[taken]:.0f} %"
+    return "" if taken == recognised.plant else taken, [f"{sentence}, {shares_text}: {remedy}."]
