@@ -22,6 +22,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_TURNS = re.compile(r"pend|angle|theta|pole|tilt", re.IGNORECASE)
 _SI = ANGLES | LENGTHS
 _COORDINATES = ("psi", "theta", "x")
 """Of the rigs that carry a pendulum."""
@@ -241,6 +242,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
         )
     if lengths and angles:
         return "cart-pendulum", ""
+    turning = [c.name for c in counts if _TURNS.search(bare_name(c.name))]
+    if lengths and turning:
+        return "cart-pendulum", f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name."
     if len(angles) >= 2:
         if all(_DISK.search(bare_name(c.name)) for c in angles):
             return f"torsional-{min(len(angles), 3)}", "Several angles were taken for disks on a shaft."
