@@ -19,6 +19,7 @@ from upright.identification.inference.assumptions import assumption_sentences, a
 from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.ceiling import judged
+from upright.identification.inference.considered import is_driven
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
 from upright.identification.inference.lateness import lateness
@@ -313,7 +314,7 @@ def _conclude(
             lost=best.lost,
             nothing=best.explains_nothing,
             ties=tied,
-            driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
+            driven=is_driven(best),
         )
     )
     return Fit(

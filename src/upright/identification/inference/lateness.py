@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from upright.identification.inference.covariance import Optimum, assess
+from upright.identification.inference.considered import consider, is_driven
+from upright.identification.inference.covariance import Optimum
 from upright.identification.inference.scoring import score_run
 from upright.identification.model.grey_box import Parameter
-from upright.identification.problem.normal_equations import pseudo_inverse
-from upright.identification.problem.unknowns import shared_unknowns
-from upright.identification.search.descent import descend
 
 LATEST = 0.2
 """Longest dead time [s] that is looked for."""
@@ -45,29 +41,17 @@ def lateness(best: Optimum) -> Lateness | None:
     None where the drive's dead time or lag is estimated or known already, or nothing is driven.
     """
     problem, x = best.problem, best.x
-    rig = problem.rig
-    stated = any(p.estimate or p.value for n, p in rig.parameters.items() if n in (DELAY, LAG))
-    if stated or not any(np.any(track.u) or track.run.loop is not None for track in problem.tracks):
+    stated = any(p.estimate or p.value for n, p in problem.rig.parameters.items() if n in (DELAY, LAG))
+    if stated or not is_driven(best):
         return None
-    delay_parameter = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
-    (late,) = shared_unknowns(replace(rig, parameters={DELAY: delay_parameter}))
-    wider = replace(problem, unknowns=[*problem.unknowns, late], steps=np.append(problem.steps, 1e-6))
-    z = np.append(x, 0.0)
-    here = wider.settle_steps(z)
-    free = np.append(~best.pinned, False)
-    aside = here.matrix[-1, free] @ pseudo_inverse(here.matrix[np.ix_(free, free)])
-    slope = float(here.gradient[-1] - aside @ here.gradient[free])
-    curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
-    if slope >= 0 or not slope**2 > PROMISED * here.cost * curvature:
+    dead_time = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
+    considered = consider(best, dead_time, share=PROMISED, tolerance=1e-6, limit=FITTED, farthest=NEAR)
+    if considered is None or considered.leaves > MENDED**2:
         return None
-    z[-1] = min(-slope / curvature, NEAR)
-    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-6, limit=FITTED)
-    if end.normal.cost > MENDED**2 * here.cost:
+    late = considered.optimum
+    if late.lost:
         return None
-    assessed = assess(wider, end.x)
-    if assessed.lost:
-        return None
-    delay, error = end.x[-1], assessed.quantile * assessed.sigma[-1]
+    delay, error = late.x[-1], late.quantile * late.sigma[-1]
     if not 0 < error < delay:
         return None
     before, after = (
@@ -76,14 +60,14 @@ def lateness(best: Optimum) -> Lateness | None:
             for i, track in enumerate(of.tracks)
             for s, p in score_run(of, i, at).fit_percent.items()
         }
-        for of, at in ((problem, x), (wider, end.x))
+        for of, at in ((problem, x), (late.problem, late.x))
     )
     run, signal = worst = min(before, key=lambda key: before[key])
     half = best.quantile * best.sigma
     bent = tuple(
         u.name
         for i, u in enumerate(problem.unknowns)
-        if u.shared and u.estimated and abs(end.x[i] - x[i]) > half[i] > 0
+        if u.shared and u.estimated and abs(late.x[i] - x[i]) > half[i] > 0
     )
     cost = f", and moves {', '.join(bent)} out of what the intervals say" if bent else ""
     ms = [f"{1e3 * value:.3g}" for value in (delay, delay - error, delay + error)]

@@ -1,11 +1,11 @@
 """A constant force that the model leaves out: how large the runs say it is, and what it would change.
 
 A frame that is not level, an amplifier's offset, a cable that pulls: none of it is in most models, and the others then
-take its part, friction first, as well in this run as it can be done, and differently in the next. So it is asked for,
-as a considered parameter is whose effect the covariance of the estimates has to hold (Schmidt 1966; Tapley, Schutz and
-Born 2004, section 6.5): where the runs show it beyond two standard errors, every interval holds the estimate with it,
-and bands what it does to a prediction. On carts with flaws that their models lack it was there in 6 of 6, 2 to 6
-standard errors large, and moved dry friction by up to 1.5 half intervals.
+take its part, friction first, as well in this run as it can be done, and differently in the next. So it is a
+considered parameter, whose effect the covariance of the estimates has to hold: where the runs show it beyond two
+standard errors, every interval holds the estimate with it, and bands what it does to a prediction. On carts with flaws
+that their models lack it was there in 6 of 6, 2 to 6 standard errors large, and moved dry friction by up to 1.5 half
+intervals.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import Optimum, assess
+from upright.identification.inference.considered import consider, is_driven
+from upright.identification.inference.covariance import Optimum
 from upright.identification.inference.intervals import Intervals, beside_bound, estimate
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import NOISE, Parameter
-from upright.identification.problem.normal_equations import pseudo_inverse
-from upright.identification.problem.unknowns import shared_unknowns
-from upright.identification.search.descent import descend
 
 Array = NDArray[np.float64]
 
@@ -65,30 +63,18 @@ class Neglected:
 
 def neglected(best: Optimum) -> Neglected | None:
     """The constant force that the runs show; None where it is asked for, or known, or not to be seen, or not there."""
-    problem, x = best.problem, best.x
+    problem = best.problem
     stated = problem.rig.parameters.get(OFFSET)
-    driven = any(np.any(track.u) or track.run.loop is not None for track in problem.tracks)
     own = any(t.ahead or "input_offset" in (*t.run.unknown, *t.run.shared) for t in problem.tracks)
-    if not driven or own or (stated is not None and (stated.estimate or stated.assumed or stated.value != 0)):
+    if not is_driven(best) or own or (stated is not None and (stated.estimate or stated.assumed or stated.value != 0)):
         return None
     limit = problem.rig.parameters.get("actuator.limit")
-    parameter = Parameter(name=OFFSET, value=0.0, unit="1" if limit is None else limit.unit, estimate=True)
-    (force,) = shared_unknowns(replace(problem.rig, parameters={OFFSET: parameter}))
-    rig = replace(problem.rig, parameters={**problem.rig.parameters, OFFSET: parameter})
-    wider = replace(problem, rig=rig, unknowns=[*problem.unknowns, force], steps=np.append(problem.steps, 1e-6))
-    z = np.append(x, 0.0)
-    here = wider.settle_steps(z)
-    free = np.append(~best.pinned, False)
-    aside = here.matrix[-1, free] @ pseudo_inverse(here.matrix[np.ix_(free, free)])
-    slope = float(here.gradient[-1] - aside @ here.gradient[free])
-    curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
-    if not curvature > 0 or not slope**2 > FELT * here.cost * curvature:
+    offset = Parameter(name=OFFSET, value=0.0, unit="1" if limit is None else limit.unit, estimate=True)
+    considered = consider(best, offset, share=FELT, tolerance=1e-4, limit=FITTED)
+    if considered is None:
         return None
-    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-4, limit=FITTED)
-    if end.interrupted:
-        raise KeyboardInterrupt
-    there = assess(wider, end.x)
-    size = estimate(there, x.size)
+    there = considered.optimum
+    size = estimate(there, best.x.size)
     if there.lost or not abs(size.value) > SHOWN * size.stderr:
         return None
     shared = [i for i in best.shared if not problem.unknowns[i].name.startswith(NOISE)]
