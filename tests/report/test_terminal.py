@@ -95,10 +95,10 @@ def test_the_cover_shows_verdicts_and_numbers_of_their_own_chapters():
     assert facts.content[0].pairs == (("when", "now"),)
     table = glance.content[0]
     assert table.rows == (
-        ("1", "T1", "rig 1", "V1", "sound"), ("2", "T2", "rig 2", "V2", "with reservations"),
+        ("1", "T1", "rig 1", "V1", "supported"), ("2", "T2", "rig 2", "V2", "with reservations"),
         ("4", "T4", "rig 4", "V4", "not finished"), ("3", "Tracking", "", "", "not run"),
     )  # fmt: skip
-    assert table.headings[table.badge] == "it is"
+    assert table.headings[table.badge] == "state"
     assert table.anchors == ("experiment-1", "experiment-2", "experiment-4")
     assert "truth" in glance.content[1]
     numbers = found.content[0]
