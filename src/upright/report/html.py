@@ -52,8 +52,8 @@ def _policy(text: str, chapters: Sequence[Chapter]) -> str:
         for c in chapters
         for b in _blocks(c)
         if isinstance(b, Live)
-        for found in re.findall(r"script-src ([^;\"]*)", b.markup)
-        for word in found.split()
+        for sources in re.findall(r"script-src ([^;\"]*)", b.markup)
+        for word in sources.split()
     }
     allowed = " ".join(sorted(own | framed)) or "'none'"
     workers = " worker-src blob:;" if framed else ""
