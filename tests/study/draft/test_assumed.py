@@ -57,7 +57,6 @@ def test_what_a_log_alone_gives_can_be_used_and_the_rest_once_it_is_measured(tmp
         assert low <= TRUTH[name] <= high
 
 
-
 def test_nothing_is_usable_while_the_counts_of_a_turn_are_assumed(drafted):
     """An encoder of 2400 counts that the draft takes for one of 4096: a swing of 1 rad looks like one of 0.6."""
     log = swing()
