@@ -172,6 +172,7 @@ class KeyNumber:
 
     what: str
     value: str
+    unit: str = ""
     interval: str = ""
     truth: str = ""
     meaning: str = ""
