@@ -139,7 +139,7 @@ class FitAnswer(Answer["Fit"]):
         values = {n: estimates[n].value if n in estimates else rig.parameters[n].value for n in rig.plant.names()}
         return rig.plant(**values)
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Data against the model for the first run, or the picture called `name`; see `pictures`."""
         if name:
             return super().plot(name)
@@ -202,7 +202,7 @@ class PredictedRuns:
 class Prediction(Answer[PredictedRuns]):
     """Scores of runs that a fit has not seen."""
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Data against the prediction of the first run, or of the run called `name`."""
         from upright.report.fit.figures import fit_figure
 
