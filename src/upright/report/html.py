@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.files import replace_file
-from upright.report.page import Book, Chapter, Picture
+from upright.report.page import Book, Chapter, Live, Picture
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
@@ -16,9 +16,20 @@ _ID = re.compile(r'\b(id="|url\(#|href="#)')
 
 def html_page(page: Chapter | Book) -> str:
     """A chapter, or a whole report, as a page that can be mailed, printed and read in ten years; texts are escaped."""
-    from upright._version import __version__
+    from markupsafe import Markup
 
-    return _rendered("page.html", page=page, version=__version__)
+    from upright._version import __version__
+    from upright.report.interactive.script import policy, script, style
+
+    chapters = page.chapters if isinstance(page, Book) else (page,)
+    blocks = [b for c in chapters for p in c.parts for b in p.content]
+    answering = any(isinstance(b, Picture) and b.answers for b in blocks)
+    scripts = [script()] if answering else []
+    return _rendered(
+        "page.html", page=page, version=__version__, script=Markup("".join(scripts)),
+        script_style=Markup(style()) if answering else "",
+        policy=policy(scripts, frames=[b.markup for b in blocks if isinstance(b, Live)]),
+    )  # fmt: skip
 
 
 def fragment(page: Chapter) -> str:
