@@ -1,35 +1,55 @@
-"""Pages as HTML: one file, figures as SVG, formulas as MathML, style inside, nothing fetched from anywhere."""
+"""Pages as HTML: one file, figures as SVG, formulas as MathML, style and script inside, nothing fetched."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
+from collections.abc import Iterator, Sequence
+from html import unescape
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from upright.files import replace_file
-from upright.report.page import Book, Chapter, Live, Picture
+from upright.report.page import Block, Book, Chapter, Live, Picture
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.S)
 
 
 def html_page(page: Chapter | Book) -> str:
     """A chapter, or a whole report, as a page that can be mailed, printed and read in ten years; texts are escaped."""
-    from markupsafe import Markup
-
     from upright._version import __version__
-    from upright.report.interactive.script import policy, script, style
 
     chapters = page.chapters if isinstance(page, Book) else (page,)
-    blocks = [b for c in chapters for p in c.parts for b in p.content]
-    answering = any(isinstance(b, Picture) and b.answers for b in blocks)
-    scripts = [script()] if answering else []
-    return _rendered(
-        "page.html", page=page, version=__version__, script=Markup("".join(scripts)),
-        script_style=Markup(style()) if answering else "",
-        policy=policy(scripts, frames=[b.markup for b in blocks if isinstance(b, Live)]),
-    )  # fmt: skip
+    scripts = list(dict.fromkeys(s for c in chapters for b in _blocks(c) if (s := getattr(b, "script", ""))))
+    text = _rendered("page.html", page=page, version=__version__, scripts=scripts)
+    return text.replace("<!-- policy -->", _policy(text, chapters), 1)
+
+
+def _blocks(chapter: Chapter) -> Iterator[Block]:
+    return (b for p in chapter.parts for b in p.content)
+
+
+def _policy(text: str, chapters: Sequence[Chapter]) -> str:
+    """Content-security policy: nothing but what stands in this page, and in the pages that it frames."""
+    own = {f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in _SCRIPT.findall(text)}
+    framed = {
+        word
+        for c in chapters
+        for b in _blocks(c)
+        if isinstance(b, Live)
+        for found in re.findall(r"script-src ([^;\"]*)", unescape(b.markup))
+        for word in found.split()
+    }
+    allowed = " ".join(sorted(own | framed)) or "'none'"
+    workers = " worker-src blob:;" if framed else ""
+    return (
+        '<meta http-equiv="Content-Security-Policy" content="'
+        f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed};{workers}\">"
+    )
 
 
 def fragment(page: Chapter) -> str:

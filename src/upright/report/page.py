@@ -116,6 +116,15 @@ class Picture:
         """What a page's script takes to draw it."""
         return self.interactive if isinstance(self.interactive, str) else self.interactive()
 
+    @property
+    def script(self) -> str:
+        """The script that draws it, which stands once in a page."""
+        if not self.answers:
+            return ""
+        from upright.report.interactive.script import script
+
+        return script()
+
     @cached_property
     def svg(self) -> str:
         """Markup of the drawing."""
