@@ -95,7 +95,7 @@ def test_a_page_can_be_parsed_heard_and_told_apart(chapter):
     assert len(set(page.ids)) == len(page.ids)
     assert {v[1:] for _, k, v in page.attributes if k.endswith("href")} <= set(page.ids)
     assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(page.ids)
-    assert not re.search(r"https?:", text)
+    assert "://" not in text
     assert not {"link", "iframe", "img"} & set(page.tags)
     assert not page.named("script", "src")
     no_computer_s_word_for_nothing(page.prose)
@@ -179,7 +179,7 @@ def test_what_a_person_wrote_is_never_taken_for_markup(page, tmp_path):
     pypdf = pytest.importorskip("pypdf")
     told = from_plain(hostile(as_plain(page(tmp_path))))
     text = html_page(told)
-    assert "<script" not in text
+    assert text.count("<script") == 1
     assert Page(text).prose.count(HOSTILE) > 10
     lines = StringIO()
     print_chapter(Console(file=lines, width=2000, highlight=False), told, [Path("[red]/report.html")])
