@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upright.report.interactive.script import script
-from upright.report.interactive.traces import MOST, TracePanel, extremes, traces
+from upright.report.interactive.traces import MOST, TracePanel, extreme_rows, traces
 
 
 def values(packed):
@@ -28,7 +28,7 @@ def times(run):
 def test_a_spike_of_one_sample_among_a_million_is_kept():
     y = np.sin(np.arange(1_000_000) * 1e-3)
     y[345_678], y[765_432] = 7.0, -9.0
-    rows = extremes([y], y.size, 2000)
+    rows = extreme_rows([y], y.size, 2000)
     assert {345_678, 765_432, 0, 999_999} <= set(rows.tolist())
     assert rows.size <= 2000
     assert np.all(np.diff(rows) > 0)
@@ -38,7 +38,7 @@ def test_a_spike_of_one_sample_among_a_million_is_kept():
 def test_every_stretch_keeps_its_least_and_greatest(samples):
     rng = np.random.default_rng(samples)
     a, b = rng.normal(size=(2, samples))
-    rows = extremes([a, b], samples, 200)
+    rows = extreme_rows([a, b], samples, 200)
     wide = -(-samples // max(1, 198 // 4)) if samples > 200 else 1
     for first in range(0, samples, wide):
         inside = rows[(rows >= first) & (rows < first + wide)]

@@ -92,7 +92,7 @@ const TRACES = [];
     plot(title, unit, { lines, bands }, { height, follow, log, last }) {
       const values = [], head = element("p", { class: "head" }, element("strong", {}, unit ? `${title} [${unit}]` : title));
       for (const line of lines.filter((l) => l.name)) {
-        const value = element("span", { class: "value" }), key = element("canvas", { width: 48, height: 12, "aria-hidden": "true" });
+        const value = element("span", { class: "reading" }), key = element("canvas", { width: 48, height: 12, "aria-hidden": "true" });
         head.append(" ", element("span", { class: "key" }, key, `${line.name} `, value));
         values.push({ line, value, key });
       }

@@ -80,7 +80,7 @@ def traces(
         Panels with a logarithmic ordinate.
     """
     per_sample = 4 / 3 * 2 * (1 + sum(p.lines() for p in panels))
-    rows = extremes(_deciding(panels), t.size, max(LEAST, min(MOST, int(room / per_sample))))
+    rows = extreme_rows(_deciding(panels), t.size, max(LEAST, min(MOST, int(room / per_sample))))
     content = {
         "name": name, "axis": axis, "unit": unit, "of": int(t.size), "restarts": restarts, **_times(t, rows),
         "panels": [{**_panel(p, rows), "logarithmic": p.name in logarithmic} for p in panels],
@@ -88,7 +88,7 @@ def traces(
     return json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def extremes(deciding: Sequence[Array], samples: int, most: int) -> NDArray[np.int64]:
+def extreme_rows(deciding: Sequence[Array], samples: int, most: int) -> NDArray[np.int64]:
     """Rows of the least and greatest value of each signal in every stretch; all rows where they are at most `most`."""
     if samples <= most or not deciding:
         return np.arange(samples) if samples <= most else np.linspace(0, samples - 1, most).astype(np.int64)
