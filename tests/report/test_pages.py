@@ -97,6 +97,7 @@ def test_a_page_can_be_parsed_heard_and_told_apart(chapter):
     assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(page.ids)
     assert "://" not in text
     assert not {"link", "iframe", "img"} & set(page.tags)
+    assert not page.named("script", "src")
     no_computer_s_word_for_nothing(page.prose)
 
 

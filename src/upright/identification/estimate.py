@@ -352,7 +352,10 @@ def _scores(
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    scores = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
+    scores = {
+        run.label: replace(score_run(whole, i, best.x, ahead), guess=score_run(whole, i, whole.start, ahead).simulated)
+        for i, run in enumerate(fitted)
+    }
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     others = [r for r in runs if r.role != "fit"]

@@ -7,6 +7,7 @@ import hashlib
 import math
 import re
 from collections.abc import Iterator, Sequence
+from html import unescape
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,7 @@ def _policy(text: str, chapters: Sequence[Chapter]) -> str:
         for c in chapters
         for b in _blocks(c)
         if isinstance(b, Live)
-        for sources in re.findall(r"script-src ([^;\"]*)", b.markup)
+        for sources in re.findall(r"script-src ([^;\"]*)", unescape(b.markup))
         for word in sources.split()
     }
     allowed = " ".join(sorted(own | framed)) or "'none'"

@@ -101,12 +101,29 @@ class Picture:
     draw : callable or str
         Gives the matplotlib figure, when somebody looks; or its markup.
     caption, description : str
+    interactive : callable or str
+        Gives what a page on a screen draws in its place, from `report.interactive`; nothing when empty.
     """
 
     name: str
     draw: Callable[[], Any] | str
     caption: str
     description: str
+    interactive: Callable[[], str] | str = ""
+
+    @cached_property
+    def answers(self) -> str:
+        """What a page's script takes to draw it."""
+        return self.interactive if isinstance(self.interactive, str) else self.interactive()
+
+    @property
+    def script(self) -> str:
+        """The script that draws it, which stands once in a page."""
+        if not self.answers:
+            return ""
+        from upright.report.interactive.script import script
+
+        return script()
 
     @cached_property
     def svg(self) -> str:
@@ -396,7 +413,7 @@ def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> 
     if isinstance(value, Symbol):
         return {"kind": "Symbol", "text": str(value)}
     if isinstance(value, Picture):
-        value = replace(value, draw=value.svg)
+        value = replace(value, draw=value.svg, interactive=value.answers)
     if isinstance(value, Mapping):
         return plain_values(value)
     if is_dataclass(value):

@@ -174,6 +174,7 @@ class RunScore:
     ceiling: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
     band: Mapping[str, Array] = field(default_factory=dict[str, Array])
     beyond: tuple[str, ...] = ()
+    guess: Array | None = None
 
     @property
     def inside(self) -> dict[str, float]:

@@ -22,6 +22,7 @@ from upright.report.fit.figures import (
     fit_figure,
     interval_figure,
 )
+from upright.report.fit.interactive import score_traces
 from upright.report.fit.tables import (
     cross_table,
     finding,
@@ -31,6 +32,7 @@ from upright.report.fit.tables import (
     run_table,
     score_table,
 )
+from upright.report.interactive.traces import ROOM
 from upright.report.page import (
     Assessment,
     Block,
@@ -253,7 +255,10 @@ def score_pictures(scores: Mapping[str, RunScore], plant: type[Plant], prefix: s
             Picture(
                 name=f"{prefix}-run{i}",
                 draw=lambda score=score, title=title: fit_figure(score, plant, title=title, buckets=buckets),
-                caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin dashed line: model; "
+                interactive=lambda score=score, title=title: score_traces(
+                    {"model": score}, plant, name=title, room=ROOM // len(runs)
+                ),
+                caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin line: model; "
                 f"below each, their difference.{_banded(score)}",
                 description=f"Measured and modelled signals over {score.t[-1] - score.t[0]:.3g} s; fit {fits}.",
             )

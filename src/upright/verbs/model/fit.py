@@ -137,7 +137,7 @@ class FitAnswer(Answer["Fit"]):
         """The plant with the numbers estimated and given."""
         return self.value.plant
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Data against the model for the first run, or the picture called `name`; see `pictures`."""
         if name:
             return super().plot(name)
@@ -200,7 +200,7 @@ class PredictedRuns:
 class Prediction(Answer[PredictedRuns]):
     """Scores of runs that a fit has not seen."""
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Data against the prediction of the first run, or of the run called `name`."""
         from upright.report.fit.figures import fit_figure
 
