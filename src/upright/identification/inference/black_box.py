@@ -140,12 +140,12 @@ def _forecast(
     return at, measured, predicted
 
 
-def black_box_run(seen: Run, run: Run, period: float) -> RunScore | None:
-    """A run as the equation predicts it that was fitted to what it has `seen`; None where there is too little to fit.
+def black_box_run(training: Run, run: Run, period: float) -> RunScore | None:
+    """A run as the equation predicts it that was fitted to the `training`; None where there is too little to fit.
 
     Parameters
     ----------
-    seen : Run
+    training : Run
         With the same signals.
     run : Run
         Predicted from its samples before ``score_from`` on, or over its shortest horizon, at the pace of the equation.
@@ -154,7 +154,7 @@ def black_box_run(seen: Run, run: Run, period: float) -> RunScore | None:
     """
     horizon = next(iter(run.horizons), None)
     stride = max(1, round(min(period, horizon or period) / STEPS / run.period))
-    known, rest = _sampled(seen, stride * run.period), _sampled(run, stride * run.period)
+    known, rest = _sampled(training, stride * run.period), _sampled(run, stride * run.period)
     ahead = None if horizon is None else max(1, round(horizon / (stride * run.period)))
     begin = int(np.searchsorted(run.t, run.t[0] + run.score_from - 1e-9))
     if known is None or rest is None:
@@ -168,10 +168,10 @@ def black_box_run(seen: Run, run: Run, period: float) -> RunScore | None:
     if not candidates:
         return None
     _, order, weights = max(candidates, key=lambda c: c[0])
-    at, measured, predicted = (np.moveaxis(a, 1, 0) for a in _forecast(weights, order, rest, ahead, first=begin))
-    y, simulated = (a.reshape(-1, rest.y.shape[1]) for a in (measured, predicted))
+    at, measured, predicted = _forecast(weights, order, rest, ahead, first=begin)
+    y, simulated = (np.moveaxis(a, 1, 0).reshape(-1, rest.y.shape[1]) for a in (measured, predicted))
     names = tuple(run.measured[k] for k in run.free)
     return RunScore(
         role="predict", fit_percent={n: fit_percent(y[:, k], simulated[:, k]) for k, n in enumerate(names)},
-        horizon=horizon, t=run.t[at.reshape(-1)], y=y, simulated=simulated, measured=names,
+        horizon=horizon, t=run.t[at.T.reshape(-1)], y=y, simulated=simulated, measured=names,
     )  # fmt: skip

@@ -124,9 +124,9 @@ def climb(
 
     Every rung is fitted to all runs from where the best rung below ended, then each run is predicted from a fit of the
     others; of a single run the last third is predicted from the first two. `decision.compare_rungs` says what better
-    means: the mean paired decrease of the logarithm of the error exceeds one standard error of it. A rung that is refused
-    is taken off again before the next one is tried, and tried once more when another was kept after it: dry friction
-    may say nothing while a lag is missing.
+    means: the mean paired decrease of the logarithm of the error exceeds one standard error of it. A rung that is
+    refused is taken off again before the next one is tried, and tried once more when another was kept after it: dry
+    friction may say nothing while a lag is missing.
 
     Parameters
     ----------

@@ -30,11 +30,11 @@ BLACK_BOX = "black box"
 class ComparedRun:
     """One run, predicted by every fit and by an equation without physics, over the same samples.
 
-    `seen` names fits to which it was fitted, so that theirs is no prediction.
+    `fitted_by` names fits to which it was fitted, so that theirs is no prediction.
     """
 
     scores: Mapping[str, RunScore]
-    seen: tuple[str, ...] = ()
+    fitted_by: tuple[str, ...] = ()
 
     def worst(self, who: str) -> float:
         """Fit percent of the signal that is predicted worst."""
@@ -72,7 +72,7 @@ class Comparison:
     @property
     def new(self) -> dict[str, ComparedRun]:
         """Runs that no fit has seen."""
-        return {label: run for label, run in self.runs.items() if not run.seen}
+        return {label: run for label, run in self.runs.items() if not run.fitted_by}
 
     @property
     def best(self) -> str:
@@ -90,9 +90,9 @@ def chapter(compared: Comparison, *, command: str) -> Chapter:
     warnings = [
         *(f"{who} is not to be trusted by its own verdict." for who in doubted),
         *(
-            f"'{label}' was fitted by {', '.join(run.seen)}: what these reach there is no prediction."
+            f"'{label}' was fitted by {', '.join(run.fitted_by)}: what these reach there is no prediction."
             for label, run in compared.runs.items()
-            if run.seen
+            if run.fitted_by
         ),
         *(
             f"{who} rests on a log of the first fit too; their errors are not independent, and the test of the "
@@ -123,9 +123,9 @@ def _prediction(compared: Comparison, beaten: list[str]) -> str:
     base = [run.worst(BLACK_BOX) for run in compared.new.values() if BLACK_BOX in run.scores]
     against = [others] * bool(others) + [f"black box {percent(min(base))}"] * bool(base)
     head = f"{best} predicts it." if len(worst) == 1 else f"{best} predicts best."
-    said = f"{head} It explains {percent(worst[best])} of the worst signal"
-    said += f" ({', '.join(against)})." if against else "."
-    return f"{said} The black box does better on {', '.join(beaten)}." if beaten else said
+    text = f"{head} It explains {percent(worst[best])} of the worst signal"
+    text += f" ({', '.join(against)})." if against else "."
+    return f"{text} The black box does better on {', '.join(beaten)}." if beaten else text
 
 
 def _differing(compared: Comparison) -> list[tuple[str, str]]:
@@ -140,8 +140,8 @@ def _parameters_sentence(compared: Comparison, differ: list[tuple[str, str]]) ->
     if not tested:
         return "No parameter is known to both, so none can be compared."
     if differ:
-        said = [f"{plain(n)} of {who} by {compared.agree[who][n].amount}" for who, n in differ[:3]]
-        return f"Parameters differ: {'; '.join(said)}{' and others' if differ[3:] else ''}."
+        text = [f"{plain(n)} of {who} by {compared.agree[who][n].amount}" for who, n in differ[:3]]
+        return f"Parameters differ: {'; '.join(text)}{' and others' if differ[3:] else ''}."
     apart = [who for who, (_, _, p) in compared.joint.items() if p < 0.05]
     if apart:
         return f"Each parameter agrees by itself, but together those of {', '.join(apart)} differ."
@@ -183,7 +183,7 @@ def _score_table(compared: Comparison) -> Table:
         for signal in next(iter(run.scores.values())).fit_percent:
             cells = [run.scores[w].fit_percent.get(signal) if w in run.scores else None for w in who]
             shown = tuple(
-                "–" if v is None else percent(v) + (" (seen)" if w in run.seen else "")
+                "–" if v is None else percent(v) + (" (seen)" if w in run.fitted_by else "")
                 for w, v in zip(who, cells, strict=True)
             )
             rows.append((label, plain(signal), *shown))
@@ -201,8 +201,8 @@ def _parameter_table(compared: Comparison) -> Table:
     for name in names:
         cells = tuple(_cell(fits[who].get(name)) for who in fits)
         of = next((fits[w][name].unit for w in fits if name in fits[w]), "")
-        said = tuple(compared.agree[who][name].sentence() if name in compared.agree[who] else "–" for who in others)
-        rows.append((Symbol(name), *cells, unit(of), *said))
+        text = tuple(compared.agree[who][name].sentence() if name in compared.agree[who] else "–" for who in others)
+        rows.append((Symbol(name), *cells, unit(of), *text))
     against = tuple(f"{who} against {first}" if others[1:] else "do they agree?" for who in others)
     return Table(
         caption="Estimates with 95 % intervals; a two-sided test on each difference, at most 5 % of all tables with a "
@@ -218,7 +218,7 @@ def _cell(e: Estimate | None) -> str:
 
 
 def _picture(compared: Comparison, name: str, label: str, run: ComparedRun) -> Picture:
-    seen = f" Fitted by {', '.join(run.seen)}." if run.seen else ""
+    fitted = f" Fitted by {', '.join(run.fitted_by)}." if run.fitted_by else ""
     worst = ", ".join(f"{who} {percent(run.worst(who))}" for who in run.scores)
     return Picture(
         name=name,
@@ -227,7 +227,7 @@ def _picture(compared: Comparison, name: str, label: str, run: ComparedRun) -> P
             run.scores, compared.plant, name=label, room=ROOM // max(len(compared.runs), 1)
         ),
         caption=f"Run '{label}'. Wide light line: measured; others: predictions; below each signal, what is left over."
-        f"{seen}",
+        f"{fitted}",
         description=f"Measured and predicted signals; of the worst signal are predicted: {worst}.",
     )
 
@@ -292,7 +292,7 @@ def _numbers(compared: Comparison) -> dict[str, object]:
         "best": compared.best,
         "runs": {
             label: {
-                "seen_by": list(run.seen),
+                "seen_by": list(run.fitted_by),
                 "fit_percent": {who: dict(score.fit_percent) for who, score in run.scores.items()},
             }
             for label, run in compared.runs.items()

@@ -235,18 +235,18 @@ def _runs(
         for place, run in enumerate(first.runs):
             if log is None and run.role != "predict":
                 continue
-            seen = tuple(
+            fitted_by = tuple(
                 name for name, f in fitted.items() if f.fitted_run(run.source) or _in_memory(sources[name], run)
             )
-            if log is None and seen:
+            if log is None and fitted_by:
                 continue
             label = run.label if run.label not in out else f"{run.label} ({len(out) + 1})"
-            out[label] = _compared(models, fitted, place, seen)
+            out[label] = _compared(models, fitted, place, fitted_by)
     return out
 
 
 def _compared(
-    models: Mapping[str, Any], fitted: Mapping[str, StoredFit], place: int, seen: tuple[str, ...]
+    models: Mapping[str, Any], fitted: Mapping[str, StoredFit], place: int, fitted_by: tuple[str, ...]
 ) -> ComparedRun:
     """One run, its second half predicted by every fit, and by an equation fitted to its first half."""
     from upright.identification.inference.black_box import black_box_run
@@ -270,7 +270,7 @@ def _compared(
     if BLACK_BOX in scores:
         others = {n: s for n, s in scores.items() if n != BLACK_BOX}
         scores = others | {BLACK_BOX: _at(scores[BLACK_BOX], next(iter(others.values())))}
-    return ComparedRun(scores=scores, seen=seen)
+    return ComparedRun(scores=scores, fitted_by=fitted_by)
 
 
 def _halves(run: Run) -> tuple[Run | None, Run]:
