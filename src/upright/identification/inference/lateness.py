@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from upright.identification.inference.considered import considered
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.scoring import score_run
 from upright.identification.model.grey_box import Parameter
-from upright.identification.problem.normal_equations import pseudo_inverse
-from upright.identification.problem.unknowns import shared_unknowns
 from upright.identification.search.descent import descend
 
 LATEST = 0.2
@@ -49,20 +48,12 @@ def lateness(best: Optimum) -> Lateness | None:
     stated = any(p.estimate or p.value for n, p in rig.parameters.items() if n in (DELAY, LAG))
     if stated or not any(np.any(track.u) or track.run.loop is not None for track in problem.tracks):
         return None
-    delay_parameter = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
-    (late,) = shared_unknowns(replace(rig, parameters={DELAY: delay_parameter}))
-    wider = replace(problem, unknowns=[*problem.unknowns, late], steps=np.append(problem.steps, 1e-6))
-    z = np.append(x, 0.0)
-    here = wider.settle_steps(z)
-    free = np.append(~best.pinned, False)
-    aside = here.matrix[-1, free] @ pseudo_inverse(here.matrix[np.ix_(free, free)])
-    slope = float(here.gradient[-1] - aside @ here.gradient[free])
-    curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
-    if slope >= 0 or not slope**2 > PROMISED * here.cost * curvature:
+    late = considered(best, Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST))
+    if late is None or not late.share > PROMISED:
         return None
-    z[-1] = min(-slope / curvature, NEAR)
+    wider, z = late.problem, np.append(late.x[:-1], min(late.x[-1], NEAR))
     end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-6, limit=FITTED)
-    if end.normal.cost > MENDED**2 * here.cost:
+    if end.normal.cost > MENDED**2 * late.cost:
         return None
     assessed = assess(wider, end.x)
     if assessed.lost:
