@@ -18,7 +18,7 @@ from upright.verbs.values import paths
 
 if TYPE_CHECKING:
     from upright.identification.model.runs import Run
-    from upright.report.fit.compare import ComparedRun
+    from upright.report.fit.compare import ComparedRun, Comparison
     from upright.study.stored_fit import StoredFit
 
 LEAD = 0.4
@@ -27,6 +27,8 @@ LEAD = 0.4
 
 class ComparisonAnswer(Answer["Comparison"]):
     """Fits beside each other."""
+
+    value: Comparison
 
     @property
     def table(self) -> Any:

@@ -13,7 +13,7 @@ from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.command import Flag, command
 from upright.verbs.study import folder_beside, read_study
-from upright.verbs.values import open_log
+from upright.verbs.values import open_log, texts
 
 if TYPE_CHECKING:
     from upright.physics import Plant
@@ -32,6 +32,8 @@ class LogOptions(TypedDict, total=False):
 
     Parameters
     ----------
+    known : mapping, optional
+        Numbers that are given [SI], or with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
     ask : sequence of names, or mapping of name to guess, optional
         What to estimate, and nothing else; without it what the draft asks and `known` leaves.
     columns : mapping of coordinate (or drive) to column, optional
@@ -42,6 +44,7 @@ class LogOptions(TypedDict, total=False):
         Part to fit [s]; the rest is left out.
     """
 
+    known: Mapping[str, float | str] | None
     ask: Sequence[str] | Mapping[str, float | str] | None
     columns: Mapping[str, str] | None
     units: Mapping[str, str] | None
@@ -106,7 +109,7 @@ def _keys() -> str:
         [actuator]
         gain = { guess = "2 N/V" }
 
-    All keys: `upright identify --keys`, or docs/study.md.
+    All keys: `upright identify --keys`, or docs/reference/study.md.
     Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
     Ctrl-C keeps the best so far and writes it.
     --hold-out each predicts every run from a fit of the others as well; --workers
@@ -118,10 +121,9 @@ def _keys() -> str:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def identify(
-    study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
-    data: str | Path | None = None, hold_out: Sequence[str] | str = (), method: str = "auto",
-    out: str | Path | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
-    progress: Progress = silent, **of_log: Unpack[LogOptions],
+    study: Any, plant: Any = None, *, data: str | Path | None = None, hold_out: Sequence[str] | str | None = None,
+    method: str = "auto", out: str | Path | None = None, report: bool = True, pdf: bool = False,
+    workers: Workforce = 1, progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> FitAnswer:  # fmt: skip
     """Fit a rig's parameters to its logs as a study file says; write estimates and report.
 
@@ -132,11 +134,9 @@ def identify(
         For a log: ``up.Pendulum``, ``"furuta"``; recognised from the columns when omitted. Of a rig or a fit, numbers
         that were given or measured are known, those that were identified or guessed are estimated from where they are,
         and assumed ones stay so.
-    known : mapping, optional
-        For a log: numbers that are given [SI], or with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
-    hold_out : sequence of str
+    hold_out : sequence of str, optional
         Runs to predict instead of fitting; "each": all in turn.
     method : str
         How to search: auto, simplex, least-squares.
@@ -152,7 +152,7 @@ def identify(
     progress : callable, optional
         Called with the current step and the share completed.
     **of_log
-        For a log: ask, columns, units, window; see `LogOptions`.
+        For a log: known, ask, columns, units, window; see `LogOptions`.
 
     Returns
     -------
@@ -178,9 +178,9 @@ def identify(
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     options = known_options(LogOptions, of_log, "identify")
-    requested = requested_study(study, plant, verb="identify", data=data, known=known, **options)
+    requested = requested_study(study, plant, verb="identify", data=data, **options)
     label = requested.path
-    held = [hold_out] if isinstance(hold_out, str) else list(hold_out)
+    held = list(texts(hold_out))
     each = "each" in held and all(run.label != "each" for run in requested.runs)
     requested = requested.hold_out(*(name for name in held if not (each and name == "each")))
     fitted = sum(run.role == "fit" for run in requested.runs)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -55,9 +54,9 @@ if TYPE_CHECKING:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def ladder(
-    study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
-    out: str | os.PathLike[str] | None = None, data: str | os.PathLike[str] | None = None, report: bool = True,
-    pdf: bool = False, workers: Workforce = 1, progress: Progress = silent, **of_log: Unpack[LogOptions],
+    study: Any, plant: Any = None, *, out: str | os.PathLike[str] | None = None,
+    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
+    progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> Answer[Ladder]:  # fmt: skip
     """Grow a model only while it predicts better what it has not seen.
 
@@ -73,8 +72,6 @@ def ladder(
         Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted; or a log.
     plant : class of a plant or its name, Rig, FitAnswer or Plant, optional
         For a log: what it is of, as `identify` takes it.
-    known : mapping, optional
-        For a log: numbers that are given, see `identify`.
     out : path, optional
         Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.
     data : path, optional
@@ -89,7 +86,7 @@ def ladder(
     progress : callable, optional
         Called with the current step and the share completed.
     **of_log
-        For a log: ask, columns, units, window; see `identify`.
+        For a log: known, ask, columns, units, window; see `identify`.
 
     Returns
     -------
@@ -115,7 +112,7 @@ def ladder(
     options = known_options(LogOptions, of_log, "ladder")
     folder = Path() if out is None else Path(out)
     requested = requested_study(
-        study, plant, verb="ladder", folder=folder, data=None if data is None else Path(data), known=known, **options
+        study, plant, verb="ladder", folder=folder, data=None if data is None else Path(data), **options
     )
     study = requested.path
     at = folder_beside(study, "ladder") if out is None else Path(out)
