@@ -152,7 +152,7 @@ def _let_go(start: Start | float | None, rig: Path, *, law: bool) -> float:
 def rig_check(
     *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
 ) -> Answer[Jitter]:
-    """Measure how late this machine wakes a loop, and say whether it holds a rate.
+    """Measure how late this machine wakes a loop, and say whether a rate is safe on it.
 
     The loop has the law and the supervision of a run.
 
@@ -216,7 +216,7 @@ def rig_doctor(
     rig: str | os.PathLike[str], *, clear: bool = False, pulse: bool = True,
     hand: Callable[[str], bool] | None = None,
 ) -> Answer[Checkup]:  # fmt: skip
-    """Look at a rig before any loop: link, limits, encoders by hand, a small pulse.
+    """Check a rig before any loop runs: link, limits, encoders by hand, a small pulse.
 
     Limits are read back; each encoder is moved by hand.
 
