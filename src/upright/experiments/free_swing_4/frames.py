@@ -86,9 +86,7 @@ def _bar(axes: Axes, end: Array) -> None:
     )
 
 
-def _vector(
-    axes: Axes, start: Array, direction: Array, letter: str, number: int, colour: str
-) -> None:
+def _vector(axes: Axes, start: Array, direction: Array, letter: str, number: int, colour: str) -> None:
     end = start + _UNIT * direction
     axes.annotate(
         "",
