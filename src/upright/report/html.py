@@ -123,17 +123,18 @@ def brief(chapter: Chapter) -> tuple[str, str, str, str]:
     words = len(f"{chapter.title} {chapter.question} {chapter.verdict} {chapter.first_line}".split())
     words += sum(len(f"{a.question} {a.state} {a.why}".split()) for a in chapter.assessments)
     shown: list[str] = []
-    more = sentences(chapter.detail)
+    assessed = " ".join(a.why for a in chapter.assessments)
+    more = [s for s in sentences(chapter.detail) if s not in assessed]
     while more and (words := words + len(more[0].split())) <= WORDS_OF_A_VERDICT:
         shown.append(more.pop(0))
     return headline, " ".join(rest), " ".join(shown), " ".join(more)
 
 
 def scale(numbers: Sequence[KeyNumber]) -> int:
-    """Half a scale [%] that the intervals of several numbers share, so that their widths compare."""
+    """Half a scale [%] that the intervals of several numbers share, so that widths compare; a fifth may leave it."""
     halves = sorted(100 * n.half for n in numbers if n.half is not None and math.isfinite(n.half))
-    middle = halves[len(halves) // 2] if halves else 0.0
-    return next((s for s in SCALES if s >= middle), SCALES[-1])
+    most = halves[-1 - len(halves) // 5] if halves else 0.0
+    return next((s for s in SCALES if s >= most), SCALES[-1])
 
 
 def evidence(chapter: Chapter) -> tuple[list[tuple[int, Part]], list[tuple[int, Part]]]:

@@ -189,6 +189,7 @@ class KeyNumber:
 
     what: str
     value: str
+    unit: str = ""
     interval: str = ""
     truth: str = ""
     meaning: str = ""

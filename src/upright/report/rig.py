@@ -223,5 +223,6 @@ class _Drawing:
         italic = f'<tspan font-style="italic" font-family="serif">{stem}</tspan>{sub}'
         self.out.append(
             f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" font-size="{size}" font-family="sans-serif"'
-            f' fill="{colour}">{italic}{blank}{rest}</text>'
+            f' fill="{colour}" style="paint-order:stroke;stroke:var(--paper, #fff);stroke-width:4px">'
+            f"{italic}{blank}{rest}</text>"
         )

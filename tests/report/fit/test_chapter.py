@@ -139,7 +139,7 @@ def test_a_model_that_ran_away_is_drawn_all_the_same(changed, written, swing):
 
 def test_a_doubtful_fit_says_so_before_its_verdict(changed, written):
     _, page = written(changed(trusted=False, interrupted=True))
-    assert "Not to be trusted yet" in page.prose
+    assert "Do not rely on this model yet" in page.prose
     assert "interrupted" in page.prose
 
 

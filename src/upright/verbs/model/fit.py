@@ -134,10 +134,8 @@ class FitAnswer(Answer["Fit"]):
 
     @property
     def plant(self) -> Plant:
-        """The plant with the numbers found and given."""
-        rig, estimates = self.value.model, self.value.estimates
-        values = {n: estimates[n].value if n in estimates else rig.parameters[n].value for n in rig.plant.names()}
-        return rig.plant(**values)
+        """The plant with the numbers estimated and given."""
+        return self.value.plant
 
     def plot(self, name: str | None = None) -> Any:
         """Data against the model for the first run, or the picture called `name`; see `pictures`."""

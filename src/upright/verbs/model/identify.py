@@ -109,7 +109,7 @@ def _keys() -> str:
         [actuator]
         gain = { guess = "2 N/V" }
 
-    All keys: `upright identify --keys`, or docs/study.md.
+    All keys: `upright identify --keys`, or docs/reference/study.md.
     Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
     Ctrl-C keeps the best so far and writes it.
     --hold-out each predicts every run from a fit of the others as well; --workers
