@@ -21,7 +21,7 @@ from upright.errors import BadInput
 from upright.physics import Plant
 from upright.physics.regressor import Regressor, regressor
 from upright.records import Array
-from upright.signals.regression import Regression, regress
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.study.sensors import Grid
@@ -169,9 +169,9 @@ class Row:
         return Row(target=self.target[here], known=known, free=[x[here] for x in self.free])
 
     @cached_property
-    def regression(self) -> Regression:
+    def regression(self) -> LeastSquares:
         """On what is known, then on the others."""
-        return regress([*(x for _, x in self.known.values()), *self.free], self.target)
+        return LeastSquares.of([*(x for _, x in self.known.values()), *self.free], self.target)
 
     @property
     def left(self) -> float:
@@ -304,7 +304,7 @@ def _size(x: Array) -> float:
 
 
 def _row_terms(motion: SmoothedMotion, i: int) -> list[Term]:
-    """Regression of one acceleration where the body slides."""
+    """LeastSquares of one acceleration where the body slides."""
     row = _row(motion, i)
     if row is None or not row.known or not np.std(row.target) > 0:
         return []

@@ -12,13 +12,23 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Regression:
+class LeastSquares:
     """Slopes (p,) of a target on columns, what they leave of it (N,), and the columns of length one (N, p)."""
 
     slopes: Array
     residual: Array
     columns: Array
     sizes: Array
+
+    @classmethod
+    def of(cls, columns: Sequence[Array] | Array, target: Array, *, rcond: float = 1e-10) -> LeastSquares:
+        """A target (N,) on columns (N,) each, or on a table (N, p); directions below `rcond` are left out."""
+        table = np.asarray(columns if isinstance(columns, np.ndarray) else np.column_stack(columns), dtype=np.float64)
+        sizes = np.linalg.norm(table, axis=0)
+        sizes = np.where(sizes > 0, sizes, 1.0)
+        unit = table / sizes
+        slopes = np.linalg.lstsq(unit, target, rcond=rcond)[0]
+        return cls(slopes=slopes / sizes, residual=target - unit @ slopes, columns=unit, sizes=sizes)
 
     @property
     def squares(self) -> float:
@@ -30,13 +40,3 @@ class Regression:
         variance = self.squares / max(independent - self.slopes.size, 1.0)
         unit = np.diag(np.linalg.pinv(self.columns.T @ self.columns))
         return np.sqrt(np.maximum(unit * variance, 0.0)) / self.sizes
-
-
-def regress(columns: Sequence[Array] | Array, target: Array, *, rcond: float = 1e-10) -> Regression:
-    """Regression of a target (N,) on columns (N,) each, or on a table (N, p); directions below `rcond` are left out."""
-    table = columns if isinstance(columns, np.ndarray) else np.column_stack(columns)
-    sizes = np.linalg.norm(table, axis=0)
-    sizes = np.where(sizes > 0, sizes, 1.0)
-    unit = table / sizes
-    slopes = np.linalg.lstsq(unit, target, rcond=rcond)[0]
-    return Regression(slopes=slopes / sizes, residual=target - unit @ slopes, columns=unit, sizes=sizes)

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from upright.systems.state_space import StateSpace
 
 Array = NDArray[np.float64]
 
 
 def march(
-    model: StateSpace, commands: Array, start: Array, gains: Array | None = None, limit: float = np.inf
+    A: Array, B: Array, commands: Array, start: Array, gains: Array | None = None, limit: float = np.inf
 ) -> tuple[Array, Array]:
-    """States (T, n) of a sampled model and what it was commanded (T, m): ``u[k] - gains x[k]`` within `limit`.
+    """States (T, n) of ``x+ = A x + B u`` and what it was commanded (T, m): ``u[k] - gains x[k]`` within `limit`.
 
     Stops short, with the samples that it has, where a state is no longer finite.
     """
@@ -28,5 +23,5 @@ def march(
             return states[: k + 1], applied[: k + 1]
         if gains is not None:
             applied[k] = np.clip(commands[k] - gains @ x[: gains.shape[1]], -limit, limit)
-        x = model.A @ x + model.B @ applied[k]
+        x = A @ x + B @ applied[k]
     return states, applied

@@ -210,8 +210,8 @@ class StateSpace(Shown):
         (j,) = _chosen(command, self.inputs, "input")[:1]
         u = np.zeros((math.floor(seconds / sampled.period * (1 + 1e-12)) + 1, len(self.inputs)))
         u[:, j] = 1.0
-        x, u = march(sampled, u, np.zeros(len(sampled.A)))
-        return sampled.period * np.arange(len(x)), x @ sampled.C.T + u @ sampled.D.T
+        x, u = march(sampled.A, sampled.B, u, np.zeros(len(sampled.A)))
+        return sampled.period * np.arange(len(x), dtype=np.float64), x @ sampled.C.T + u @ sampled.D.T
 
     def to_sampled(self, period: float, delay: float = 0.0, lag: float = 0.0, *, method: str = "zoh") -> StateSpace:
         """The model at its samples, exactly; see `held`.

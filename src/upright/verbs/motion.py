@@ -16,7 +16,7 @@ from upright.physics import Plant
 from upright.records import Provenance, Record
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
-from upright.verbs.linear.motion import linear_motion
+from upright.verbs.linear.motion import motion_of_linear
 
 if TYPE_CHECKING:
     from upright.rig import Rig
@@ -147,9 +147,9 @@ def _of_linear(
     largest = math.inf if limit is None else si(limit, model.unit or "1")
     if not largest > 0:
         raise BadInput(f"simulate needs a limit above 0, got {largest:g}.")
-    t = np.arange(round(seconds / every) + 1) * every
+    t = np.arange(round(seconds / every) + 1, dtype=np.float64) * every
     x0 = _start(model.states, [model.units.get(n, "1") for n in model.states], {}, start)
-    return linear_motion(model, law, x0, _command(u, t, len(model.inputs)), t, largest)
+    return motion_of_linear(model, law, x0, _command(u, t, len(model.inputs)), t, largest)
 
 
 def _check_times(seconds: float, dt: float) -> None:

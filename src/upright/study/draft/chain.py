@@ -18,7 +18,7 @@ from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS
-from upright.signals.regression import regress
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
@@ -295,7 +295,7 @@ def starts(
             if switches:
                 columns["on"] = -savitzky_golay(np.where(command != 0, v, 0.0), dt, width).q
         columns["constant"] = np.ones(t.size)
-        answer = regress([c[edge] for c in columns.values()], -acting[own, i][edge])
+        answer = LeastSquares.of([c[edge] for c in columns.values()], -acting[own, i][edge])
         errors = answer.errors(answer.residual.size / width)  # as many independent samples as smoothing widths
         slope, error = (dict(zip(columns, x.tolist(), strict=True)) for x in (answer.slopes, errors))
         shared = next((n for n in columns if n in numbers and slope[n] > 0), "")

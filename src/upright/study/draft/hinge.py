@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from upright.physics import Plant
 from upright.physics.regressor import regressor
-from upright.signals.regression import regress
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import Motion
 
 
@@ -34,9 +34,9 @@ def hinge_of(plant: type[Plant], motion: Motion, inside: slice) -> Hinge:
     throws, pulls = ([k for k, b in enumerate(equations.base) if b.always and k != own and roles[k] == role]
                      for role in ("inertia", "force"))  # fmt: skip
     table = -row[[*throws, *pulls]].T
-    both = regress(table, row[own])
+    both = LeastSquares.of(table, row[own])
     throw, gravity = both.slopes.tolist()
     return Hinge(
-        throw=throw, gravity=gravity, left=both.squares, unthrown=regress(table[:, 1:], row[own]).squares,
-        weightless=regress(table[:, :1], row[own]).squares,
+        throw=throw, gravity=gravity, left=both.squares, unthrown=LeastSquares.of(table[:, 1:], row[own]).squares,
+        weightless=LeastSquares.of(table[:, :1], row[own]).squares,
     )  # fmt: skip

@@ -20,7 +20,7 @@ from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.records.columns import ANGLES, LENGTHS
-from upright.signals.regression import regress
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
@@ -141,7 +141,7 @@ def balance_of(record: Record, recognised: Recognised) -> Balanced | None:
     # close to upright all that the pendulum does to the first coordinate goes with its angle
     speed = motion.v[0]
     table = np.column_stack([push, motion.q[1], speed, np.sign(speed), np.ones_like(push)])[inside]
-    pull = regress(table, motion.a[0][inside]).slopes[0]
+    pull = LeastSquares.of(table, motion.a[0][inside]).slopes[0]
     return Balanced(rate=math.sqrt(hinge.gravity), throw=hinge.throw, pull=float(pull), centre=centre)
 
 

@@ -13,7 +13,7 @@ from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS, bare_name
-from upright.signals.regression import regress
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
@@ -390,7 +390,7 @@ def _pushed(t: Array, u: Array, x: Array) -> float:
     a = motion.a[width:-width]
     if not both[:, 0].any():
         return 0.0
-    pushed, alone = regress(both, a), regress(both[:, 1:], a)
+    pushed, alone = LeastSquares.of(both, a), LeastSquares.of(both[:, 1:], a)
     return float(pushed.slopes[0]) if pushed.squares < CLEAR * alone.squares else 0.0
 
 

@@ -18,7 +18,7 @@ from upright.verbs.linear.feedback import Gains
 Array = NDArray[np.float64]
 
 
-def linear_motion(
+def motion_of_linear(
     model: StateSpace, law: Any, start: Array, commands: Array | None, t: Array, limit: float = math.inf
 ) -> Record:  # fmt: skip
     """States, outputs that are no states, and commands of a model at evenly spaced times (T,) from 0 [s].
@@ -30,7 +30,7 @@ def linear_motion(
     """
     sampled = model.to_sampled(float(t[1] - t[0])) if model.dt is None else model
     u = np.zeros((t.size, len(model.inputs))) if commands is None else commands
-    x, u = march(sampled, u, start, _gains(model, law), limit)
+    x, u = march(sampled.A, sampled.B, u, start, _gains(model, law), limit)
     wild = ~(np.abs(x) < 1e15)
     if wild.any():
         k = int(np.argmax(wild.any(axis=1)))
