@@ -21,9 +21,7 @@ from upright.rig.makes import make_rig
 
 SOURCE = Path(upright.__file__).parent
 RUNNER = CliRunner()
-OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
-CUSTOM_PROPERTY = re.compile(r"var\(--[\w-]*|--[\w-]+:")
-"""Of a style sheet: its name begins as an option does."""
+OPTION = re.compile(r"(?<![\w-])(?<!var\()--[a-z][a-z-]*")
 PROPOSED = re.compile(rf"upright ({'|'.join([*(f'{a} {b}' for a, bs in NESTED.items() for b in bs), *COMMANDS])})\b")
 OTHERS = {
     "--upload", "--path", "--eval", "--mjcf", "--show-plot", "--start-values", "--always", "--dirty", "--error-unmatch",
@@ -70,7 +68,7 @@ def sentences(path: Path) -> Iterator[tuple[int, str]]:
 def wrong(text: str, here: set[str]) -> list[str]:
     """Options named in a text that the command named before them lacks; `here` are those of a text that names none."""
     found = []
-    pieces = PROPOSED.split(CUSTOM_PROPERTY.sub("", text))
+    pieces = PROPOSED.split(text)
     for command, piece in zip([None, *pieces[1::2]], pieces[::2], strict=True):
         valid = here if command is None else OPTIONS[command]
         # behind a command, its line ends where the sentence goes on
