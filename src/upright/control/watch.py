@@ -133,10 +133,8 @@ def watched(
 
     Parameters
     ----------
-    watch : Watch
     rig : Rig
         As it truly is.
-    law : Law
     start, seconds, rest
         As of `trial`.
     """

@@ -59,7 +59,6 @@ def check_up(
 
     Parameters
     ----------
-    path : Path
     hand : callable, optional
         Called with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
         A twin's own hand does it when omitted.
