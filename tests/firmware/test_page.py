@@ -13,10 +13,10 @@ import upright as up
 from benchmarks.boards import COUNTS, plant
 from benchmarks.designs import GAIN, PARAMETERS
 from tests.firmware.test_laboratory import RIG, STUDY
-from tests.firmware.test_pwm import STEPS, SUPPLY
+from tests.firmware.test_pwm import MEGA_STEP, SUPPLY
 
 PAGE = (Path(__file__).parents[2] / "docs" / "build.md").read_text(encoding="utf-8")
-FOLLOWED = STUDY.replace('converter = "0.00030517578125 V"', f'converter = "{SUPPLY / STEPS} V"')
+FOLLOWED = STUDY.replace('converter = "0.00030517578125 V"', f'converter = "{MEGA_STEP} V"')
 """The study of a rig with its supply in steps of PWM, as step 3 asks."""
 SCALE = re.search(r"\[board\]\n +(full_scale = [\d.]+)\n", PAGE)[1]
 
@@ -35,7 +35,7 @@ def described(tmp_path):
 
 
 def test_the_doctor_of_step_4_finds_a_rig_that_is_wired_well(avr, described):
-    board = avr(*plant(PARAMETERS, GAIN), f"step={SUPPLY / STEPS!r}", drive="pair")
+    board = avr(*plant(PARAMETERS, GAIN), f"step={MEGA_STEP!r}", drive="pair")
 
     def turns(sentence):
         board.do("put 0.3 0 0.3 0" if "theta" in sentence else "put 0.3 0 0 0", "hold", "run 20")
@@ -49,7 +49,7 @@ def test_the_doctor_of_step_4_finds_a_rig_that_is_wired_well(avr, described):
 
 
 def test_the_doctor_of_step_4_finds_channels_that_are_swapped(avr, described):
-    board = avr(*plant(PARAMETERS, GAIN), f"step={SUPPLY / STEPS!r}", drive="pair")
+    board = avr(*plant(PARAMETERS, GAIN), f"step={MEGA_STEP!r}", drive="pair")
     board.do("flip 0")
 
     def turns(sentence):
