@@ -71,7 +71,7 @@ def _start(firmware: Path) -> float:
     """How long a program takes until it arms its rig [s]."""
     began = time.monotonic()
     die(firmware, MOMENTS[1], WHOLE)
-    return time.monotonic() - began - 1.2  # by which what is dead was looked at
+    return time.monotonic() - began - 0.3  # by which what is dead was looked at
 
 
 def _rows(lines: list[Line]) -> list[str]:

@@ -223,7 +223,8 @@ def _dead(program: Program, moment: Moment, way: str) -> Death:
     then = _power(board)
     if way == WHOLE:
         program.gone()
-    _PAUSE.wait(SETTLED + (DEAF if way == OUT_OF_SIGHT else PATIENCE if moment.mode == Mode.ARMED else 0.0))
+    longest = DEAF if way == OUT_OF_SIGHT else PATIENCE if moment.mode == Mode.ARMED and way != WHOLE else 0.0
+    _PAUSE.wait(SETTLED + longest)
     if moment.mode != Mode.IDLE or moment.over:  # a program that was stopped before it armed arms when it goes on
         program.goes_on()
         _PAUSE.wait(SETTLED)
