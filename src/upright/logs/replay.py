@@ -163,7 +163,8 @@ def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> A
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", "from upright.logs.replay import answer; answer()"],
-            input=pickle.dumps((MEMORY, as_values(law), stretches, file)), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            input=pickle.dumps((MEMORY, as_values(law), stretches, file)),
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}, timeout=deadline, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
