@@ -17,7 +17,7 @@ ENDING: tuple[signal.Signals, ...] = tuple(
 
 
 @contextmanager
-def without(signals: Sequence[signal.Signals] = INTERRUPT) -> Generator[None]:
+def ignoring(signals: Sequence[signal.Signals] = INTERRUPT) -> Generator[None]:
     """Ignore signals meanwhile, in this process and in those that it starts; nothing in a thread, which gets none."""
     if threading.current_thread() is not threading.main_thread():
         yield

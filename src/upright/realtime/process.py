@@ -19,7 +19,7 @@ from typing import Any
 
 from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import of_values
-from upright.realtime.interrupts import ENDING, without
+from upright.realtime.interrupts import ENDING, ignoring
 from upright.realtime.pace import Pace, Virtual, WallClock
 from upright.realtime.priority import step_forward
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
@@ -100,7 +100,7 @@ def run_in_process(
     child = context.Process(
         target=_child, args=(os.getpid(), order, memory, phase, stop, looks, theirs, paced), name="upright loop"
     )
-    with without():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
+    with ignoring():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
         child.start()
     theirs.close()
     window = _Window(memory, phase)
@@ -113,11 +113,11 @@ def run_in_process(
     except EOFError:
         answer = None
     except KeyboardInterrupt:
-        with without():  # a second one must not lose the verdict
+        with ignoring():  # a second one must not lose the verdict
             stop.value = 1
             answer = _last(ours)
     finally:
-        with without():
+        with ignoring():
             stop.value = 1
             child.join(10.0)
             if child.is_alive():

@@ -404,7 +404,7 @@ class Supervisor:
             return PULSES[1] * self.held.command, None
         response = None
         for share in PULSES:
-            response, per_unit = answer(model, self.duty.zero, share * self.held.command), model.per_unit
+            response, per_unit = pulse_response(model, self.duty.zero, share * self.held.command), model.per_unit
             counts = [abs(v * per) for v, per in zip(response.moved.values(), per_unit, strict=True)]
             if min(counts) >= PLAIN:
                 return share * self.held.command, response
@@ -450,7 +450,7 @@ class Supervisor:
         return f"{math.degrees(abs(value)):.3g} degrees" if unit == "rad" else f"{1e3 * abs(value):.3g} mm"
 
 
-def answer(model: Rig, zero: str, pulse: float) -> SelfTest:
+def pulse_response(model: Rig, zero: str, pulse: float) -> SelfTest:
     """What a model does under a pulse [command unit] where its encoders are zeroed, if nothing limits it."""
     board = Board(TwinPort(replace(model, scales=()), zero, full_scale=2.0 * max(model.limit, abs(pulse))))
     about = board.open()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from upright.errors import RigStopped
+from upright.rig import Rig
 from upright.rigs import Fault
 from upright.rigs.rigfile import read_rig_file
-from upright.running.power_up import PAUSE, CheckupFinding, FirstPowerUp, Hand, corrected, described
+from upright.running.power_up import PAUSE, CheckupFinding, FirstPowerUp, Hand
 from upright.running.rig import model_and_truth, stage_of
 
 __all__ = ["Checkup", "CheckupFinding", "check_up"]
@@ -96,7 +100,7 @@ def check_up(
         about = beside.prepare()
         ticks = f"{about.name}, {len(about.counts)} encoders, a tick every {1e3 * about.period:.4g} ms"
         out.append(CheckupFinding(what="link", observed=ticks))
-        out += described(model, about.period, about.counts)
+        out += _described(model, about.period, about.counts)
         held = ", ".join(f"{n} {v:.4g}" for n, v in zip(about.coordinates, beside.held.travel, strict=True))
         volts, silence = f"{beside.held.command:.4g} {about.command_unit}", f"{1e3 * beside.held.watchdog:.4g} ms"
         held = f"travel {held}; command {volts}; watchdog {silence}"
@@ -115,8 +119,9 @@ def check_up(
         rig.estop()
         rig.close()
     counts, written = dict(steps.counts), None
+    lines = ", ".join(f"{name} = {value:.6g}" for name, value in counts.items())
     if counts and hand is not None and file.hardware and hand(
-        f"Shall {path} take the counts that were seen, {corrected(counts)}? No, if you rather swap channels."
+        f"Shall {path} take the counts that were seen, {lines}? No, if you rather swap channels."
     ):  # fmt: skip
         written = file.with_counts(counts)
     return Checkup(
@@ -133,3 +138,16 @@ def _of_drive(steps: FirstPowerUp) -> Iterator[CheckupFinding]:
             yield finding
         if wrong:
             return
+
+
+def _described(model: Rig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
+    """Whether the rig is the one that was described."""
+    same = math.isclose(period, model.period, rel_tol=1e-3)
+    compared = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
+    alike = bool(np.allclose(np.abs(counts), model.per_unit, rtol=1e-6))
+    return [
+        CheckupFinding(what="servo period", observed=compared, good=same,
+                       fix="" if same else "period in [board], or servo_period of the description"),
+        CheckupFinding(what="counts", observed=", ".join(f"{c:.6g}" for c in counts), good=alike,
+                       fix="" if alike else "[counts], or counts of the description"),
+    ]  # fmt: skip

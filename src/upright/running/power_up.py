@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -21,7 +21,7 @@ from upright.errors import RigStopped
 from upright.rig import Rig
 from upright.rigs import Board, Fault, LiveRig, Mode, TwinPort
 from upright.rigs.board import fault_text
-from upright.rigs.supervisor import ALIKE, Supervisor, answer
+from upright.rigs.supervisor import ALIKE, Supervisor, pulse_response
 
 QUARTER = math.pi / 2
 LENGTH = 0.1
@@ -289,7 +289,7 @@ class FirstPowerUp:
         return self._strength(shown, went / model[self.driven], went / least[self.driven])
 
     def _expected(self, pulse: float) -> list[float]:
-        return list(answer(self.model, self.beside.duty.zero, pulse).moved.values())
+        return list(pulse_response(self.model, self.beside.duty.zero, pulse).moved.values())
 
     def _strength(self, shown: str, ratio: float, at_most: float) -> CheckupFinding:
         guessed = "actuator.gain" in self.model.guessed
@@ -383,23 +383,5 @@ class FirstPowerUp:
             self.rig.clear_fault()
 
 
-def described(model: Rig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
-    """Whether the rig is the one that was described."""
-    same = math.isclose(period, model.period, rel_tol=1e-3)
-    compared = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
-    alike = bool(np.allclose(np.abs(counts), model.per_unit, rtol=1e-6))
-    return [
-        CheckupFinding(what="servo period", observed=compared, good=same,
-                       fix="" if same else "period in [board], or servo_period of the description"),
-        CheckupFinding(what="counts", observed=", ".join(f"{c:.6g}" for c in counts), good=alike,
-                       fix="" if alike else "[counts], or counts of the description"),
-    ]  # fmt: skip
-
-
 def _amount(value: float, unit: str) -> str:
     return f"{math.degrees(value):.3g} degrees" if unit == "rad" else f"{1e3 * value:.3g} mm"
-
-
-def corrected(counts: Mapping[str, float]) -> str:
-    """Counts as a sentence has them."""
-    return ", ".join(f"{name} = {value:.6g}" for name, value in counts.items())
