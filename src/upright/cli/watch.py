@@ -42,8 +42,8 @@ def _asking(question: str) -> Callable[[str], bool] | None:
 
     def ask(sentence: str) -> bool:
         try:
-            asked = sentence if sentence.endswith("?") else f"{sentence} {question}"
-            return typer.confirm(asked, default=True, err=True)
+            text = sentence if sentence.endswith("?") else f"{sentence} {question}"
+            return typer.confirm(text, default=True, err=True)
         except typer.Abort:
             raise KeyboardInterrupt from None
 

@@ -215,12 +215,12 @@ def _end_with_parent() -> None:
 
 def _deaf(looks: Any, clock: Callable[[], float] = time.monotonic) -> Callable[[], bool]:
     """Whether the parent has stopped looking; evaluated at every tick."""
-    seen, since = -1, 0.0
+    last, since = -1, 0.0
 
     def deaf() -> bool:
-        nonlocal seen, since
-        if looks.value != seen:
-            seen, since = looks.value, clock()
+        nonlocal last, since
+        if looks.value != last:
+            last, since = looks.value, clock()
         return clock() - since > DEAF
 
     return deaf

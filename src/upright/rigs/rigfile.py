@@ -164,9 +164,9 @@ class RigFile:
         """Write signed counts per turn or metre into the file; everything else stays as its owner wrote it."""
         lines = [f"{name} = {toml(value, 9)}" for name, value in {**self.counts, **counts}.items()]
         text = self.path.read_text(encoding="utf-8").rstrip("\n")
-        before, found, after = text.partition("\n[counts]")
+        before, section, after = text.partition("\n[counts]")
         rest = "".join(f"\n[{part}" for part in after.split("\n[")[1:])
-        before = before if found else text + "\n"
+        before = before if section else text + "\n"
         return replace_file(self.path, "\n".join([before, "[counts]", *lines, ""]).encode() + rest.encode())
 
     def lean(self, unit: str, default: float) -> float:

@@ -26,7 +26,7 @@ from upright.rigs.supervisor import ALIKE, Supervisor, pulse_response
 QUARTER = math.pi / 2
 LENGTH = 0.1
 """How far a hand moves a coordinate that does not turn, where its travel allows [m]."""
-SEEN = 0.2
+TOLERANCE = 0.2
 """By how much a hand misses what it was asked for, as a share of it."""
 DECODED = (0.25, 0.5, 2.0, 4.0)
 """Counts over those described, where lines were taken for counts or edges for lines."""
@@ -104,7 +104,7 @@ class FirstPowerUp:
 
     def _moved_by_hand(self, i: int) -> CheckupFinding:
         coordinate, per = self.model.plant.coordinates[i], np.array(self.beside.about.counts)
-        what, asked, words = f"{coordinate.name} by hand", *self._asked(i)
+        what, requested, words = f"{coordinate.name} by hand", *self._amount_and_way(i)
         before = self.rig.exchange(0.0)
         if before.faults:
             return CheckupFinding(what=what, observed=fault_text(before.faults), good=False)
@@ -113,18 +113,18 @@ class FirstPowerUp:
                 return CheckupFinding(what=what, observed="not moved", good=None)
         elif self.twin is not None:
             away = np.zeros(2 * len(per))
-            away[2 * i] = asked
+            away[2 * i] = requested
             self.twin.hold(next(iter(self.model.plant.equilibria)), away)
         else:
             return CheckupFinding(what=what, observed="it was not moved", good=None)
         moved = np.array(self.rig.exchange(0.0).counts) - before.counts
         shown = _amount(moved[i] / per[i], coordinate.unit)
-        if abs(moved[i]) < SEEN / 2 * asked * abs(per[i]):
+        if abs(moved[i]) < TOLERANCE / 2 * requested * abs(per[i]):
             # of an encoder at another's place the counts come there
-            there = np.abs(np.abs(moved) / (asked * abs(per[i])) - 1.0) <= SEEN
+            there = np.abs(np.abs(moved) / (requested * abs(per[i])) - 1.0) <= TOLERANCE
             others = [c.name for c, other in zip(self.model.plant.coordinates, there, strict=True) if other]
             return self._silent(what, shown, coordinate.name, others)
-        return self._judged(i, what, shown, float(moved[i] / per[i]) / asked)
+        return self._judged(i, what, shown, float(moved[i] / per[i]) / requested)
 
     @staticmethod
     def _silent(what: str, shown: str, name: str, others: list[str]) -> CheckupFinding:
@@ -142,7 +142,7 @@ class FirstPowerUp:
     def _judged(self, i: int, what: str, shown: str, ratio: float) -> CheckupFinding:
         name, described = self.model.plant.coordinates[i].name, self.model.counts[i]
         way = math.copysign(1.0, self.beside.about.counts[i])
-        if abs(abs(ratio) - 1.0) <= SEEN:
+        if abs(abs(ratio) - 1.0) <= TOLERANCE:
             if ratio > 0:
                 return CheckupFinding(what=what, observed=f"showed {shown}")
             self.counts[name] = -way * round(described, 6)
@@ -151,7 +151,7 @@ class FirstPowerUp:
                 fix=f"swap channels A and B of {name}'s encoder, or give its counts a minus",
             )  # fmt: skip
         factor = min(DECODED, key=lambda f: abs(math.log(abs(ratio) / f)))
-        likely = abs(abs(ratio) / factor - 1.0) <= SEEN
+        likely = abs(abs(ratio) / factor - 1.0) <= TOLERANCE
         counts = round(described * factor) if likely else float(f"{described * abs(ratio):.2g}")
         if likely:
             self.counts[name] = math.copysign(counts, way * ratio)
@@ -164,13 +164,13 @@ class FirstPowerUp:
             "them (four times the lines of an encoder)",
         )  # fmt: skip
 
-    def _asked(self, i: int) -> tuple[float, str]:
+    def _amount_and_way(self, i: int) -> tuple[float, str]:
         """How far a hand is to move a coordinate, and in words to which side."""
         coordinate, travel = self.model.plant.coordinates[i], self.beside.held.travel[i]
         sense = "in the sense that is to be positive"
         if coordinate.unit != "rad":
-            asked = LENGTH if travel > 1.5 * LENGTH else float(f"{travel / 2:.1g}")
-            return asked, f"by {1e3 * asked:.4g} mm {sense}"
+            requested = LENGTH if travel > 1.5 * LENGTH else float(f"{travel / 2:.1g}")
+            return requested, f"by {1e3 * requested:.4g} mm {sense}"
         if i == self.driven:
             sense += ", such as anticlockwise seen from above" if travel < math.inf else ""
         elif (against := self._against()) is not None:
@@ -225,9 +225,9 @@ class FirstPowerUp:
         not_yet = f", and not at {below:.3g} {unit}" if below else ""
         yield CheckupFinding(what="the drive, backward", observed=f"moves from {first:.3g} {unit} on{not_yet}")
 
-    def _steadied(self, asked: str = "Bring all to rest where it hangs, and take your hands away.") -> None:
+    def _steadied(self, request: str = "Bring all to rest where it hangs, and take your hands away.") -> None:
         if self.hand is not None:
-            self.hand(asked)
+            self.hand(request)
         elif self.twin is not None:
             self.twin.hold(self.beside.duty.zero)
             self.twin.let_go()
