@@ -47,7 +47,7 @@ HELD_BY, DRY = 2.0, 0.003
 """A body is held at most by so many times the dry friction that the model knows of; where it knows of none, by such a
 share of the largest command."""
 BOUNDS = {
-    ("body", 0.0): 8.0, ("body", -1.0): 6.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
+    ("body", 0.0): 8.0, ("body", -1.0): 13.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
     ("body", 4.0): 20.0, ("other", 0.0): 12.0, ("other", -1.0): 7.0, ("other", 0.25): 19.0, ("other", 0.5): 19.0,
     ("other", 2.0): 5.5, ("other", 4.0): 7.0, ("drive", 0.25): 4.6, ("drive", 0.5): 4.6,
 }  # fmt: skip
@@ -223,10 +223,10 @@ class Watch:
         self._mean += self._slow * (parts - self._mean)
         costs = self._costs(parts - self._mean)
         gained = costs[0] - costs[1:]
-        gained[0] = self._dead(parts)
+        gained[0], gained[1] = self._dead(parts), self._turned(parts)
         self.odds *= self._memory
         self.odds += self._weight * gained
-        self.odds[0] = np.maximum(0.0, self.odds[0])  # of a counter that moved a moment ago nothing is held against it
+        self.odds = np.maximum(self.odds, 0.0)  # a part that was sound a moment ago may be broken now
         ranked, k = np.sort(self.odds, axis=0), self._witnesses.samples
         beyond = (self.odds > self._bounds).any(axis=0)
         self._since = np.where(beyond, np.where(self._since < 0, k, self._since), -1)
@@ -275,6 +275,26 @@ class Watch:
         free = np.maximum(0.0, np.abs(X - Z) - self._friction) / (far + 0.25 * self._friction)
         sound = _surprise(free) + _surprise((Y - X) / far)
         return sound - _surprise((Y - Z) / far) - _surprise(of_body / self._of_body)
+
+    def _turned(self, parts: Array) -> Array:
+        """Logarithm of the odds of this look, shape (lanes,), that the body's encoder shows the wrong way round.
+
+        Slow motions count too, and friction is an excuse only for what it brakes: it drives nothing on.
+        """
+        of_body, by_other, of_other, by_body, Z = parts
+        X, Y = of_body + by_other, of_other + by_body
+        largest = RELATIVE * np.abs(np.array([X, Y, Z])).max(axis=0)
+        near, far = self._of_body + 0.25 * self._friction + largest, self._of_other + largest
+        speed = self._witnesses.speed[0]
+        unsure = np.abs(speed) < (2 * np.abs(X) + self._of_body) / CORNER  # it turned a moment ago
+
+        def cost(way: float) -> Array:
+            x, y = way * of_body + by_other, of_other + way * by_body
+            brakes = unsure | ((x - Z) * way * speed < 0)
+            free = np.maximum(0.0, np.abs(x - Z) - np.where(brakes, self._friction, 0.0))
+            return _surprise(free / near) + _surprise((y - x) / far)
+
+        return cost(1.0) - cost(-1.0)
 
     def speaks(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Whether the drive is to be switched off after the last reading, and for which suspicion, lane by lane."""

@@ -70,6 +70,12 @@ class Witnesses:
         """Of the pendulum, behind the low-pass, shape (lanes,)."""
         return self._passed[1, 1] + self._first[1]
 
+    @property
+    def speed(self) -> Array:
+        """Of body and pendulum, behind the low-pass, shape (2, lanes)."""
+        once, twice = self._passed[:, :2]
+        return self._corner * (once - twice)
+
     def parts(self) -> Array:
         """X, Y and Z by the encoder that they are read from, shape (5, lanes).
 
@@ -77,7 +83,7 @@ class Witnesses:
         """
         once, twice = self._passed
         acceleration = self._corner**2 * (self._now - 2 * once + twice)
-        speed, lean = self._corner * (once - twice), self.lean
+        speed, lean = self.speed, self.lean
         (a, b, c), (d, e, f) = self.rows
         return np.array([
             acceleration[0] - a * speed[0], -b * lean - c * speed[1],
