@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,8 @@ from upright.identification.inference.black_box import black_box
 from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
-from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
-from upright.identification.inference.neglected import neglected, with_force
+from upright.identification.inference.neglected import is_driven, lateness, neglected, with_force
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.ties import ties, with_ties
@@ -272,15 +271,15 @@ def _conclude(
     estimates = {n: estimates[n] for n in requested.parameters if n in estimates}
     if not brief:
         estimates = with_model_uncertainty(estimates, best, requested, left_out, log)
-    force = None if brief or little else neglected(best)
-    if force is not None:
+    forces = () if brief or little else neglected(best)
+    for force in forces:
         estimates |= {
             n: widened(estimates[n], i) for n, i in force.intervals.items() if estimates[n].status not in FIXED
         }
         warnings.append(force.sentence())
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
-    bands = bands if force is None or bands is None else with_force(bands, force)
+    bands = None if bands is None else reduce(with_force, forces, bands)
     ahead = None if best.lost else judged(problem, best.x)
     scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
     skipped = _skipped(runs, watch=watch) if end.interrupted else ()
@@ -307,13 +306,14 @@ def _conclude(
             interrupted=end.interrupted,
             memory=best.memory,
             bent=late.bent if late else (),
+            missing=tuple(force.sentence() for force in forces if force.essential),
             period=min(t.period for t in problem.tracks),
             standing=None if brief or identifiable.hidden else standing(best),
             judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
             ties=tied,
-            driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
+            driven=is_driven(best),
         )
     )
     return Fit(
@@ -353,7 +353,10 @@ def _scores(
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    scores = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
+    scores = {
+        run.label: replace(score_run(whole, i, best.x, ahead), guess=score_run(whole, i, whole.start, ahead).simulated)
+        for i, run in enumerate(fitted)
+    }
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     others = [r for r in runs if r.role != "fit"]

@@ -227,10 +227,11 @@ def test_poles_of_a_pair_stand_with_both_parts(changed):
     ("what", "said"),
     [
         ({"interrupted": True, "failed": True}, "search was interrupted"), ({"failed": True}, "The fit failed"),
-        ({"trusted": False}, "Not to be trusted yet."), ({}, "Trusted."),
+        ({"trusted": False}, "Do not rely on this model yet."),
+        ({}, "Rely on this model for prediction and for a loop."),
         ({"answers": (Judgement(question="Q", answer="not tested", headline="H"),)}, "Not tested: it explains"),
         ({"answers": (Judgement(question="Q", answer="yes", headline="H"),
-                      Judgement(question="Q", answer="not tested", headline="H"))}, "Trusted."),
+                      Judgement(question="Q", answer="not tested", headline="H"))}, "for prediction; its drive"),
     ],
 )  # fmt: skip
 def test_the_headline_says_the_worst_first(changed, what, said):
@@ -251,7 +252,7 @@ def part(fit, key, **more):
 def test_the_chapter_stands_on_what_the_fit_has(fit, changed):
     told = chapter(fit, provenance={"a": {"b": 1, "c": None, "d": ""}, "runs": ["x", "y"]})
     assert part(fit, "data").content == ("No origin was stated for these data.",)
-    assert told.parts[0].content[0].pairs == (("a / b", "1"), ("runs", "x; y"))
+    assert told.parts[-1].content[0].pairs == (("a / b", "1"), ("runs", "x; y"))
     assert part(fit, "how").content[0].sentences == (
         "simplex, then Levenberg-Marquardt; 321 evaluations in 1.23 s; final cost 0.456.",
     )
@@ -348,7 +349,16 @@ def test_a_model_that_nothing_tests_is_to_be_tested(changed, runs, more, told):
 @pytest.mark.parametrize(("value", "worse"), [(-0.1, True), (0.0, False)])
 def test_a_signal_is_worse_than_its_mean_below_zero_percent(changed, value, worse):
     steps = said(changed(runs={"a": score(fit_percent={"theta": value})}))
-    assert any("θ of run 'a' is explained worse than by its mean" in s for s in steps) == worse
+    assert any("θ is explained worse than by its mean ('a'" in s for s in steps) == worse
+
+
+def test_a_reversed_sign_is_named_where_the_percent_is_that_of_one(changed):
+    """Of y about zero, -y explains 100 (1 - |y + y| / |y|) = -100 %; what is missed by more has another cause."""
+    runs = {"a": score(fit_percent={"theta": -100.0}), "b": score(fit_percent={"theta": -90.0})}
+    (one,) = (s for s in said(changed(runs=runs)) if "worse than by its mean" in s)
+    assert "('a' −100.0 %, 'b' −90.0 %), as by a reversed sign" in one
+    (other,) = (s for s in said(changed(runs=runs | {"b": score(fit_percent={"theta": -400.0})})) if "worse than" in s)
+    assert "look at the plant and at the units" in other
 
 
 @pytest.mark.parametrize(("percents", "lost"), [((79.9, 99.0), True), ((80.0, 99.0), False)])

@@ -13,6 +13,7 @@ from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS, bare_name
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
@@ -22,6 +23,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_TURNS = re.compile(r"pend|angle|theta|pole|tilt", re.IGNORECASE)
 _SI = ANGLES | LENGTHS
 _COORDINATES = ("psi", "theta", "x")
 """Of the rigs that carry a pendulum."""
@@ -221,8 +223,7 @@ def drive_column(record: Record, inspection: Inspection) -> Column | None:
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
-    named = _by_coordinates({bare_name(c.name) for c in places})
-    if named:
+    if named := named_after(places):
         return named, f"The columns are called as the coordinates of a {named}."
     lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
@@ -242,6 +243,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
         )
     if lengths and angles:
         return "cart-pendulum", ""
+    turning = [c.name for c in counts if _TURNS.search(bare_name(c.name))]
+    if lengths and turning:
+        return "cart-pendulum", f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name."
     if len(angles) >= 2:
         if all(_DISK.search(bare_name(c.name)) for c in angles):
             return f"torsional-{min(len(angles), 3)}", "Several angles were taken for disks on a shaft."
@@ -252,12 +256,13 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     return "pendulum", doubt
 
 
-def _by_coordinates(names: set[str]) -> str:
-    """The only plant whose coordinates have just these names; empty where there is none.
+def named_after(places: list[Column]) -> str:
+    """The only plant whose coordinates have just the names of these columns; empty where there is none.
 
     Of our own only those that carry a pendulum: theta and alpha are arm and pendulum of Quanser's QUBE as well as hub
     and link of a flexible one.
     """
+    names = {bare_name(c.name) for c in places}
     fitting = [n for n, plant in PLANTS.sound().items() if {c.name for c in plant.coordinates} == names]
     own = len(names) > 1 and names <= set(_COORDINATES)
     return fitting[0] if len(fitting) == 1 and (own or fitting[0] not in PLANTS.own) else ""
@@ -382,14 +387,11 @@ def _pushed(t: Array, u: Array, x: Array) -> float:
     motion = savitzky_golay(np.interp(grid, t, x), step, width)
     push = savitzky_golay(np.interp(grid, t, u), step, width).q
     both = np.column_stack([push, motion.q, motion.v, np.sign(motion.v), np.ones_like(push)])[width:-width]
-    a, scale = motion.a[width:-width], np.abs(both).max(axis=0)
-    both = both[:, scale > 0] / scale[scale > 0]
-    if not scale[0] > 0:
+    a = motion.a[width:-width]
+    if not both[:, 0].any():
         return 0.0
-    slopes, *_ = np.linalg.lstsq(both, a, rcond=None)
-    alone, *_ = np.linalg.lstsq(both[:, 1:], a, rcond=None)
-    left, without = np.sum((a - both @ slopes) ** 2), np.sum((a - both[:, 1:] @ alone) ** 2)
-    return float(slopes[0]) if left < CLEAR * without else 0.0
+    pushed, alone = LeastSquares.of(both, a), LeastSquares.of(both[:, 1:], a)
+    return float(pushed.slopes[0]) if pushed.squares < CLEAR * alone.squares else 0.0
 
 
 CLEAR = 0.9
