@@ -1,15 +1,15 @@
 """How a rig is wired, from its first motions: signs of drive and encoders, counts per turn, what the drive gives.
 
 The pendulum's row of eq. (3), ``J theta'' + kappa cos(theta) q'' + weight sin(theta) = spin sin cos q'^2 - friction``,
-has no drive in it, and ``kappa/weight`` is r/g of an arm and 1/g of a cart, whatever the pendulum weighs. With readings
-``theta = h/c`` and ``q = p/s``,
+has no drive in it, and ``kappa/weight`` is r/g of an arm and 1/g of a cart, whatever the pendulum weighs. With
+readings ``theta = h/c`` and ``q = p/s``,
 
     h'' = -w^2 c sin(h/c) - (kappa/weight) w^2 c cos(h/c) p''/s + ...,
 
-so that small and large swings tell w and c (a pendulum at 90 degrees is 18 % slower than at 10), and their answer to p''
-tells s with its sign. The driven body's row then tells what a unit of command gives, and the command that is lost to
-either side: ``force = gain (u - dead_zone sign(u))``. All columns go through one low-pass, which leaves a linear
-relation as it is.
+so that small and large swings tell w and c (a pendulum at 90 degrees is 18 % slower than at 10), and their answer to
+p'' tells s with its sign. The driven body's row then tells what a unit of command gives, and the command that is lost
+to either side: ``force = gain sign(u) max(|u| - dead_zone, 0)``. All columns go through one low-pass, which leaves a
+linear relation as it is.
 
 Of drive, body and pendulum one is turned round against the two others, or none: all three turned round is the same rig
 seen in a mirror.
@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +33,10 @@ SMOOTHED = 0.08
 """Length of the low-pass [s]."""
 APART = 0.008
 """Step of the differences [s]."""
+OF_RATIO = 0.01
+"""Relative standard error of kappa and of kappa/weight, as well as a ruler gives the length of an arm."""
+OF_LIMIT = 0.002
+"""Standard error of a dead zone, as a share of the largest command: friction close to rest passes for as much."""
 LONGEST = 0.04
 """Delay and lag of a drive together, at most [s]."""
 WEAK = 0.75
@@ -40,8 +45,8 @@ PLAIN = 20
 """Counts without which nothing is said of an encoder."""
 USUAL = tuple(
     sorted({lines * edges for edges in (1, 2, 4) for lines in (
-        100, 200, 250, 256, 300, 360, 400, 500, 512, 600, 720, 1000, 1024, 1250, 1800, 2000, 2048, 2500, 3600, 4000, 4096,
-        5000)})
+        100, 200, 250, 256, 300, 360, 400, 500, 512, 600, 720, 1000, 1024, 1250, 1800, 2000, 2048, 2500, 3600, 4000,
+        4096, 5000)})
 )  # fmt: skip
 """Counts per turn that encoders have."""
 
@@ -97,11 +102,11 @@ class Wiring:
 
     @property
     def weak(self) -> str:
-        """That the drive gives less than described, as a sentence; a loop made from what it gives may be closed."""
+        """That the drive gives less than described, as a clause; a loop made from what it gives may be closed."""
         if not self.drive + SURE * self.drive_error < WEAK:
             return ""
         share = "half" if abs(self.drive - 0.5) < 0.1 else f"{self.drive:.2g} of what is described"
-        return f"supply at {share}: the drive gives {self.drive:.2g} ± {2 * self.drive_error:.1g} times its description."
+        return f"supply at {share}: the drive gives {self.drive:.2g} ± {2 * self.drive_error:.1g} times its description"
 
     @property
     def _turned(self) -> tuple[tuple[str, str], ...]:
@@ -131,11 +136,10 @@ class Wiring:
             if abs(scale - 1.0) <= max(TOLERATED, SURE * error):
                 continue
             counts = abs(said) * scale
-            near = min(USUAL, key=lambda usual: abs(usual - counts))
-            likely = turns and abs(near - counts) < max(0.02, 2 * error / scale) * counts
-            unit = "turn" if turns else "metre"
-            is_ = f"{near:.0f}" if likely else f"{float(f'{counts:.3g}'):.0f}"
-            what = f"{name}: counts per {unit} {is_}, not {abs(said):.6g}"
+            usual = {round(abs(said) * edges) for edges in (0.25, 0.5, 2.0, 4.0)} | (set(USUAL) if turns else set())
+            near = sorted(n for n in usual if abs(n - counts) < counts * max(0.005, 2.5 * error / scale))
+            likely = " or ".join(f"{n}" for n in near) if 0 < len(near) < 4 else f"{float(f'{counts:.3g}'):.0f}"
+            what = f"{name}: counts per {'turn' if turns else 'metre'} {likely}, not {abs(said):.0f}"
             out.append((what, f"it shows {scale:.3g} ± {2 * error:.1g} times what is true; correct its counts"))
         return tuple(out)
 
@@ -181,11 +185,15 @@ class _Motion:
         self.p2, self.h2 = ((a[2 * every :] - 2 * a[every:-every] + a[: -2 * every]) / step**2 for a in (p, h))
         self.window = np.hanning(max(5, round(SMOOTHED / dt)) + 2)[1:-1]
         self.window /= self.window.sum()
+        self.every = max(1, self.window.size // 4)
 
     def smooth(self, *columns: Array) -> Array:
         """Columns, shape (M, columns), thinned to a quarter of the window."""
-        every = max(1, self.window.size // 4)
-        return np.column_stack([np.convolve(c, self.window, mode="valid")[::every] for c in columns])
+        return np.column_stack([self.smoothed(c)[:: self.every] for c in columns])
+
+    def smoothed(self, column: Array) -> Array:
+        """One column through the low-pass, shorter by its length."""
+        return np.asarray(np.convolve(column, self.window, mode="valid"), dtype=np.float64)
 
 
 def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, float], float]:
@@ -202,17 +210,17 @@ def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, floa
 
     def solved(c: float, s: float) -> tuple[Array, Array]:
         rows = columns(c, s)
-        theta = np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0]
+        theta = np.asarray(np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0], dtype=np.float64)
         return theta, rows[:, 0] - rows[:, 1:] @ theta
 
     def of(c: float) -> tuple[float, Array, float]:
-        s = 1.0
-        for _ in range(4):
-            theta, left = solved(c, s)
-            s = abs(theta[0] / theta[1]) if theta[1] else s
+        theta, left = solved(c, 1.0)
+        for _ in range(2):
+            theta, left = solved(c, abs(theta[0] / theta[1]) if theta[1] else 1.0)
+        s = abs(theta[0] / theta[1]) if theta[1] else 1.0
         return float(left @ left), theta, s
 
-    tried = np.geomspace(0.15, 6.0, 75)
+    tried = np.geomspace(0.15, 6.0, 60)
     c = float(tried[int(np.argmin([of(float(c))[0] for c in tried]))])
     _, theta, s = of(c)
     start = np.array([math.log(c), theta[0], theta[1], theta[2], theta[3]])
@@ -226,11 +234,14 @@ def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, floa
     spread = np.linalg.pinv(J.T @ J) * float(result.fun @ result.fun) / max(len(result.fun) - 5, 1) * 4.0
     c, s = math.exp(x[0]), abs(x[1] / x[2])
     to_s = np.array([0.0, 1 / x[1], -1 / x[2], 0.0, 0.0]) * s
-    return (s, c), (math.sqrt(max(to_s @ spread @ to_s, 0.0)), c * math.sqrt(max(spread[0, 0], 0.0))), float(x[1] / x[2])
+    of_s = math.hypot(math.sqrt(max(to_s @ spread @ to_s, 0.0)), s * OF_RATIO)
+    return (s, c), (of_s, c * math.sqrt(max(spread[0, 0], 0.0))), float(x[1] / x[2])
 
 
 def _of_drive(model: Rig, b: Body, found: Wiring, m: _Motion, u: Array, dt: float) -> Wiring:
     """What the drive gives, by the row of the body: inertia, friction, gain and dead zone."""
+    from scipy.optimize import minimize_scalar
+
     s, c = found.scale[0], found.scale[1] * found.swings
     q1, q2, theta, w, w2 = m.p1 / s, m.p2 / s, m.h / c, m.h1 / c, m.h2 / c
     sine, cosine = np.sin(theta), np.cos(theta)
@@ -238,23 +249,40 @@ def _of_drive(model: Rig, b: Body, found: Wiring, m: _Motion, u: Array, dt: floa
     known = b.kappa * (cosine * w2 - sine * w**2) + b.spin * (sine**2 * q2 + 2 * sine * cosine * w * q1)
     quiet = 0.02 * float(np.std(q1))
     fixed = m.smooth(known, -q2, -q1, -np.tanh(q1 / quiet))
-    best: tuple[float, int, Array, Array] | None = None
-    for late in range(round(LONGEST / dt) + 1):
-        applied = np.concatenate([np.zeros(late), u[: u.size - late]])[m.k : u.size - m.k]
-        rows = np.column_stack([fixed, m.smooth(applied, -np.sign(applied))])
-        x = np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0]
-        left = rows[:, 0] - rows[:, 1:] @ x
-        if best is None or float(left @ left) < best[0]:
-            best = float(left @ left), late, x, rows[:, 1:]
-    assert best is not None
-    cost, late, x, rows = best
-    spread = np.linalg.pinv(rows.T @ rows) * cost / max(len(rows) - x.size, 1) * 4.0
-    gain, lost = float(x[3]), float(x[4])
-    share, sign = abs(gain / model.gain), math.copysign(1.0, gain * model.gain)
-    to = np.array([-lost / gain**2, 1 / gain])
+    delays = range(round(LONGEST / dt) + 1)
+
+    def of(lost: float) -> tuple[float, int, Array, Array]:
+        """Cost, delay in samples, coefficients and columns where so much of the command is lost."""
+        passed = np.sign(u) * np.maximum(np.abs(u) - lost, 0.0)
+        early = m.smoothed(np.concatenate([np.zeros(delays[-1]), passed]))
+        best: tuple[float, int, Array, Array] | None = None
+        for late in delays:
+            applied = early[delays[-1] - late + m.k :: m.every][: len(fixed)]
+            rows = np.column_stack([fixed[:, 1:], applied])
+            x = np.asarray(np.linalg.lstsq(rows, fixed[:, 0], rcond=None)[0], dtype=np.float64)
+            cost = float(np.sum((fixed[:, 0] - rows @ x) ** 2))
+            if best is None or cost < best[0]:
+                best = cost, late, x, rows
+        assert best is not None
+        return best
+
+    delays = range(of(0.0)[1] + 1)  # what a dead zone hides of a drive does not make it faster
+    tried = np.linspace(0.0, 0.9 * float(np.abs(u).max()), 31)
+    costs = [of(lost)[0] for lost in tried.tolist()]
+    k = int(np.argmin(costs))
+    around = (float(tried[max(k - 1, 0)]), float(tried[min(k + 1, tried.size - 1)]))
+    best: Any = minimize_scalar(lambda v: of(v)[0], bounds=around, method="bounded", options={"xatol": 1e-4})
+    lost = float(best.x)
+    lost = 0.0 if costs[0] <= of(lost)[0] else lost
+    cost, late, x, rows = of(lost)
+    edge = np.concatenate([np.zeros(late), -np.sign(u) * (np.abs(u) > lost)])[m.k : u.size - m.k]
+    rows = np.column_stack([rows, x[-1] * m.smooth(edge)])
+    spread = np.linalg.pinv(rows.T @ rows) * cost / max(len(rows) - x.size - 1, 1) * 4.0
+    gain = float(x[-1])
     return replace(
-        found, moves=sign, drive=share, drive_error=math.sqrt(spread[3, 3]) / abs(model.gain), dead_zone=lost / gain,
-        dead_error=math.sqrt(max(float(to @ spread[3:, 3:] @ to), 0.0)), delay=late * dt,
+        found, moves=math.copysign(1.0, gain * model.gain), drive=abs(gain / model.gain), dead_zone=lost,
+        drive_error=math.hypot(math.sqrt(spread[3, 3]), OF_RATIO * gain) / abs(model.gain),
+        dead_error=math.hypot(math.sqrt(spread[4, 4]), OF_LIMIT * model.limit), delay=late * dt,
     )  # fmt: skip
 
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from upright.control import SwingUp, design_swing_up
-from upright.control.exploration import CALMS, KICKS, SECONDS, exploration
+from upright.control.exploration import CALMS, KICKS, PUMPS, SECONDS, exploration
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import SUBSTEPS
 from upright.control.wiring import Wiring, wiring
@@ -109,8 +108,8 @@ def run_quick(
     """
     driven, pendulum = stand.names
     stand.ask(
-        f"Let {pendulum} hang at rest, with {driven} in the middle of its travel, and keep clear: for a minute it moves "
-        "by itself and ends upright."
+        f"Let {pendulum} hang at rest, with {driven} in the middle of its travel, and keep clear: for a minute it "
+        "moves by itself, and ends upright."
     )
     progress("first motions", 0.0)
     rule = exploration(stand.rig, stand.travel)
@@ -118,11 +117,12 @@ def run_quick(
     shown = np.column_stack([log[n] for n in stand.names])
     mode = rule.follow(shown, stand.rig.period)[1][:, 0]
     found = wiring(stand.rig, log.t, shown - shown[0], log[APPLIED])
-    so_far: dict[str, Any] = {"stand": stand, "log": log, "mode": mode, "wiring": found, "seconds": float(log.t[-1])}
+    result = QuickRun(stand=stand, log=log, mode=mode, wiring=found, seconds=float(log.t[-1]))
+    if not found.wrong and not np.any(mode == PUMPS):
+        return replace(result, refused="the drive hardly moves it: look at its supply and its current limit")
     if found.wrong:
-        return QuickRun(**so_far, refused="; ".join(what for what, _ in found.wrong))
+        return replace(result, refused="; ".join(what for what, _ in found.wrong))
     study, fit = fit_study(_study(stand, log, mode, folder), part(progress, 0.3, 0.8, "fitting the motion"))
-    so_far |= {"study": study, "fit": fit}
     if fit.interrupted or stopped():
         raise KeyboardInterrupt
     described = stand.described_by(folder / "fit.json", folder)
@@ -131,16 +131,14 @@ def run_quick(
     progress("designing", 0.8)
     law = design_swing_up(model, travel=OF_TRAVEL * stand.travel)
     share = caught(model, law, seed)
-    so_far |= {"model": model, "law": law, "share": share}
+    result = replace(result, study=study, fit=fit, model=model, law=law, share=share)
     if share < ENOUGH:
-        return QuickRun(**so_far, refused=f"of {LANES} rigs that the fit allows only {share:.0%} are caught")
+        return replace(result, refused=f"of {LANES} rigs that the fit allows only {share:.0%} are caught")
     progress("swinging up", 0.9)
     law_of_rig = law.rule(described.rig, described.rig.plant.state(described.resting))
     run = described.hold(law_of_rig, "inverted", folder, "swing_up", UP, settled=True)
     began, ended = float(log.t[-1]), float(run.trial.t[-1])
-    return QuickRun(
-        **so_far | {"seconds": began + ended}, ascent=ascent_of(run.trial, law, law_of_rig), ended=run.ended
-    )  # fmt: skip
+    return replace(result, seconds=began + ended, ascent=ascent_of(run.trial, law, law_of_rig), ended=run.ended)
 
 
 def _study(stand: LiveStand, log: Record, mode: Array, folder: Path) -> Path:
@@ -158,7 +156,7 @@ def caught(model: Rig, law: SwingUp, seed: int) -> float:
     start = np.tile(model.plant.state("hanging"), (LANES, 1))
     samples = round(UP / model.period)
     x = simulate(
-        model.plant, model.drive | dict(allowed(model, LANES, seed)), start, None, model.period, samples=samples,
+        model.plant, dict(model.drive) | dict(allowed(model, LANES, seed)), start, None, model.period, samples=samples,
         substeps=SUBSTEPS, loop=law.rule(model, start),
     )  # fmt: skip
     last = np.mod(x[-round(HELD / model.period) :, 2], 2 * math.pi) - math.pi
