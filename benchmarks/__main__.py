@@ -29,13 +29,13 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
     "workers", "long", "gpu", "crash", "safety", "false_stops", "minute", "images", "soak", "jitter", "gym", "at_hand",
-    "first", "kept", "strangers", "live", "mutants",
+    "first", "kept", "strangers", "live", "peers", "mutants",
 )  # fmt: skip
-APART = ("mutants",)
-"""Those that run when they are named, and never among all: what is asked there is not how fast."""
+APART = ("peers", "mutants")
+"""Those that run when they are named, and never among all: what is asked there is not how fast we are."""
 PUBLISHED = (
     "first", "kept", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers",
-    "crash", "safety", "false_stops", "soak", "jitter", "gym", "mutants",
+    "crash", "safety", "false_stops", "soak", "jitter", "gym", "peers", "mutants",
 )  # fmt: skip
 SHARED = (
     "first", "kept", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts",
@@ -102,13 +102,16 @@ def main(arguments: list[str] | None = None) -> int:
         help=f"which ones, of {', '.join(NAMES)}; default: all but {', '.join(APART)}",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
-    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, three to four minutes")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, two to three minutes")
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
     pages = ", ".join(PUBLISHED)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help=f"write the page of one of {pages}")
     parser.add_argument("--starts", type=int, default=300, metavar="N", help="random starts of each study in `starts`")
     parser.add_argument(
-        "--workers", type=int, metavar="N", help=f"processes for {', '.join(SHARED)}; default 1; for mutants 2"
+        "--workers",
+        type=int,
+        metavar="N",
+        help=f"processes for {', '.join(SHARED)}; default 1; with --quick and for mutants 2",
     )
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     changes = parser.add_argument_group("mutants")
@@ -144,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     asked = parser.parse_args(arguments)
     try:
-        shared = {"workers": Workers(number=asked.workers or 1, cluster=asked.cluster)}
+        shared = {"workers": Workers(number=asked.workers or (2 if asked.quick else 1), cluster=asked.cluster)}
     except BadInput as error:
         parser.error(str(error))
     if asked.markdown and (len(asked.names) != 1 or asked.names[0] not in PUBLISHED):

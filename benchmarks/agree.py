@@ -282,8 +282,8 @@ def page(pairs: Sequence[Pair], left_out: Sequence[str]) -> str:
         "|---|---|",
         *(f"| {what} | {told(some)} |" for what, some in grouped(pairs)),
         "",
-        "Names are those of [the paper](../docs/nomenclature.md), SI. *Wide*: too wide to disagree. *(?)*: a fit is not"
-        " trusted.",
+        "Names are those of [the paper](../docs/reference/nomenclature.md), SI. *Wide*: too wide to disagree. *(?)*: a"
+        " fit is not trusted.",
         "",
         "| study | parts | number | first | second | |",
         "|---|---|---|---|---|---|",

@@ -1,7 +1,7 @@
 """How often does `upright doctor` find a fault that was put in, and how often one that was not?
 
 Every line is one fault in records of random rigs (`benchmarks/doctored.py`); ``python -m benchmarks doctor`` writes the
-table of docs/doctor.md too.
+table of docs/howto/doctor.md too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from benchmarks.measure import Line
 EACH, QUICK = 100, 3
 """Records per plant and fault."""
 SEED = 2026
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "doctor.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "doctor.md"
 BEGIN, END = "<!-- table: python -m benchmarks doctor -->", "<!-- end of table -->"
 
 
@@ -55,7 +55,7 @@ def count(fault: str, each: int, seed: int) -> Count:
 
 
 def markdown(counts: list[Count], seed: int) -> str:
-    """Table of docs/doctor.md."""
+    """Table of docs/howto/doctor.md."""
     lines = [
         f"{counts[0].records} records per fault, {len(PLANTS)} plants, seed {seed}.",
         "",
@@ -70,7 +70,7 @@ def markdown(counts: list[Count], seed: int) -> str:
 
 
 def write_page(text: str) -> None:
-    """Replace the table of docs/doctor.md."""
+    """Replace the table of docs/howto/doctor.md."""
     page = PAGE.read_text(encoding="utf-8")
     before, _, rest = page.partition(BEGIN)
     _, _, after = rest.partition(END)
@@ -78,7 +78,7 @@ def write_page(text: str) -> None:
 
 
 def run(*, quick: bool, progress: Callable[[str], None], seed: int = SEED) -> list[Line]:
-    """Hits and false alarms; the full run rewrites the table in docs/doctor.md."""
+    """Hits and false alarms; the full run rewrites the table in docs/howto/doctor.md."""
     counts: list[Count] = []
     lines: list[Line] = []
     for fault in ("", *FAULTS):

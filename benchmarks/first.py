@@ -301,7 +301,7 @@ def run(
     """A line of each plant's twins and of the public logs, one of the dialects, and one of the time."""
     sources = twins(1 if quick else 20)
     groups = {make.plant: [s for s in sources if s.plant == make.plant] for make in MAKES}
-    real = public()[:: 12 if quick else 1]
+    real = public()[:: 24 if quick else 1]
     groups |= {"public logs": real} if real else {}
     contacts: dict[str, list[Contact]] = {}
     for name, logs in groups.items():

@@ -24,7 +24,7 @@ from benchmarks.measure import Line, Target, page, spread
 from upright.realtime.jitter import TOLERATED, Jitter, measure
 from upright.running.tick import supervised
 
-SECONDS, QUICK = 60.0, 5.0
+SECONDS, QUICK = 60.0, 2.0
 WORK = 1e-4
 """What law and supervision of a tick may take [s]: a fifth of a period at 2 kHz."""
 EDGES = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)

@@ -168,13 +168,13 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     lines, one, _ = duel("closed loops", loops, seeds, two, rounds)
     block = one.items / len(seeds)
     progress("fits")
-    lines += duel("fits", fits, range(10 if quick else 40), two, min(rounds, 5))[0]
+    lines += duel("fits", fits, range(4 if quick else 40), two, min(rounds, 5))[0]
     progress("nothing at all")
-    lines.append(idle("two processes", two, 500 if quick else 2000)[0])
+    lines.append(idle("two processes", two, 200 if quick else 2000)[0])
     if not quick:
         lines += _cluster(seeds, progress)
     scaling: list[tuple[int, float, float, float]] = []
-    for number in (8,) if quick else (2, 4, 8, 16, 32):
+    for number in (4,) if quick else (2, 4, 8, 16, 32):
         progress(f"{number} workers that wait")
         for seconds in (block, 10 * block):
             count = max(min(400, round(4 * number / seconds)), 8 * number)

@@ -1,4 +1,4 @@
-"""Build what is computed in this folder: `python -m docs [NAMES] [--check]`.
+"""Build what is computed in this folder: `python -m docs [NAMES] [--check]`; the site: `python -m docs build` or `serve`.
 
 Notebooks are run and store what they show, the nomenclature is written from the plants, drawings from pin tables. With --check nothing is
 written: it says which cells no longer run, or say something else than what is stored.
@@ -17,25 +17,41 @@ from docs.drawings import IMAGES, drawings
 from docs.notebook import CellFailed, differences, executed
 
 HERE = Path(__file__).parent
-NOMENCLATURE = HERE / "nomenclature.md"
+NOMENCLATURE = HERE / "reference" / "nomenclature.md"
+NOTEBOOKS = HERE / "tutorials"
 
 
 def main() -> int:
     """Run what was asked; 1 when something no longer holds."""
     ask = argparse.ArgumentParser(prog="python -m docs", description=__doc__.splitlines()[0])
     ask.add_argument(
-        "names", nargs="*", metavar="NAME", help="such as experiment_4; all when left out"
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="build or serve for the site, or notebooks such as experiment_4; all of them when left out",
     )
     ask.add_argument(
         "--check", action="store_true", help="compare with what is stored and write nothing"
     )
+    ask.add_argument(
+        "--quick", action="store_true", help="build without identifying the public rigs"
+    )
+    ask.add_argument("--port", type=int, default=8000, help="of serve; 0 takes a free one")
     asked = ask.parse_args()
-    names = asked.names or sorted(path.stem for path in HERE.glob("*.ipynb"))
+    if asked.names in (["build"], ["serve"]):
+        from docs import site
+
+        return (
+            site.build(quick=asked.quick)
+            if asked.names == ["build"]
+            else site.serve(asked.port, quick=asked.quick)
+        )
+    names = asked.names or sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb"))
     failed = not asked.names and (_nomenclature(asked.check) | _drawings(asked.check))
     for name in names:
-        path = HERE / f"{name}.ipynb"
+        path = NOTEBOOKS / f"{name}.ipynb"
         if not path.is_file():
-            ask.error(f"there is no notebook {path.name} in {HERE.name}/")
+            ask.error(f"there is no notebook {path.name} in docs/tutorials/")
         stored = nbformat.read(path, as_version=4)
         try:
             fresh = executed(stored)

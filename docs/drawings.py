@@ -1,4 +1,4 @@
-"""Drawings of docs/build.md: wires from the firmware's own tables, and what of a rig's body matters, with its symbols."""
+"""Drawings of docs/tutorials/own_rig.md: wires from the firmware's own tables, and what of a rig's body matters, with its symbols."""
 
 from __future__ import annotations
 

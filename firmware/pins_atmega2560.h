@@ -1,5 +1,5 @@
 /* Wires of an Arduino Mega 2560: port, bit, number on the board. The program is compiled with this table, and
- * `upright firmware pins` and the drawing in docs/build.md are made from it. */
+ * `upright firmware pins` and the drawing in docs/tutorials/own_rig.md are made from it. */
 #ifndef PINS_H
 #define PINS_H
 

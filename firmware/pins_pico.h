@@ -1,5 +1,5 @@
 /* Wires of a Raspberry Pi Pico: numbers GPn of the board. The program is compiled with this table, and
- * `upright firmware pins` and the drawing in docs/build.md are made from it. Its pins stand 3.3 V and no more. */
+ * `upright firmware pins` and the drawing in docs/tutorials/own_rig.md are made from it. Its pins stand 3.3 V and no more. */
 #ifndef PINS_H
 #define PINS_H
 

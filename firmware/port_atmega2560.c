@@ -1,7 +1,7 @@
 /* Arduino Mega 2560 at 16 MHz: a tick of 1 kHz, two encoders, the host at 1 Mbaud; drive_analog.c or drive_pwm.c puts
  * the command out. pins_atmega2560.h has the wires.
  *
- * The power stage's line needs a resistor to ground: pins float during a reset. docs/build.md has the wiring. */
+ * The power stage's line needs a resistor to ground: pins float during a reset. docs/tutorials/own_rig.md has the wiring. */
 #ifndef __AVR_ATmega2560__
 #error "An Uno-class board (ATmega328P, 32U4) has 2 kB of memory, of which frames and limits alone take most, pin-change \
 interrupts on ports that Arduino spreads, and no third timer for PWM: take a Mega 2560 or a Pico."

@@ -4,7 +4,7 @@
  *
  * In IDLE and FAULT the command is zero and the power stage is off. A reset and a new host's HELLO end in FAULT:
  * nothing moves before the host has cleared it and said limits, none of them wider than ceilings.h. The numbers of modes and faults are those of src/upright/rigs/protocol.py, frames those of
- * src/upright/rigs/wire.py; docs/firmware.md has both as tables.
+ * src/upright/rigs/wire.py; docs/reference/firmware.md has both as tables.
  *
  * This is supervision in software, not a rated safety function; a rig needs a stop in hardware besides. */
 #ifndef RIG_H

@@ -150,8 +150,58 @@ def test_a_log_is_examined_whatever_the_rig_came_in(form, forms, log):
     assert not up.doctor(log, rig=rig).value.wrong
 
 
-def test_the_study_of_a_fit_climbs_its_ladder(fit):
-    assert up.ladder(fit.study).value.steps
+@pytest.mark.parametrize("form", ["fit", "rig"])
+def test_another_log_of_a_rig_is_asked_for_what_was_identified_before(form, fit):
+    """What was given stays known, so that nothing but the inertia and the friction is estimated once more."""
+    again = up.identify(driven(0.05), fit if form == "fit" else fit.rig)
+    numbers = [n for n, e in again.value.estimates.items() if e.status not in ("known", "left out")]
+    assert numbers == ["J_p", "b_2"]
+    for name in numbers:
+        low, high = again[name].interval
+        assert low <= NUMBERS[name] * (1 + 1e-3)
+        assert high >= NUMBERS[name] * (1 - 1e-3)
+
+
+def test_a_rig_whose_command_is_turned_is_identified_from_its_log():
+    """The gain of the rig turns its command; the log, made by the rig itself, has it as it was given."""
+    turned = up.Rig.known(RIG, gain="-0.05 N m/V", limit="10 V", period="2 ms", counts=16_000)
+    t = np.arange(0, 6, 2e-3)
+    command = 2 * np.sin(math.tau * (0.3 * t + 0.15 * t**2))
+    log = measured(up.simulate(turned, start={"theta": "30 deg"}, seconds=6, u=command, dt="2 ms"))
+    fit = up.identify(log, turned, ask=["J_p", "actuator.gain"])
+    assert fit["actuator.gain"].value == pytest.approx(-0.05, rel=1e-3)
+    assert fit["J_p"].value == pytest.approx(NUMBERS["J_p"], rel=1e-3)
+    assert (fit.rig.limit, fit.rig.period) == (10.0, 0.002)
+    assert fit.rig.counts == pytest.approx((16_000, 16_000))
+    with pytest.raises(up.BadInput, match=r"commanded in V, and column T of its log is in N m; pass its plant alone"):
+        up.identify(log.replace(units={**log.units, "T": "N m"}), turned)
+
+
+def test_a_rig_that_is_known_altogether_has_no_friction_left_to_find():
+    """A drag-free, dry-frictionless pendulum: the log shows none, and the answer says so instead of failing."""
+    swing = up.Pendulum(m_p=0.2235, l_cg=0.2, J_p=0.0035, b_2=2e-4)
+    fit = up.identify(measured(up.simulate(swing, start={"theta": "30 deg"}, seconds=10, dt="2 ms")), swing)
+    assert {e.status for e in fit.value.estimates.values()} <= {"known", "left out"}
+    assert fit["J_p"].value == 0.0035
+
+
+def test_assumed_numbers_of_a_rig_stay_assumed(fit, log):
+    rig = fit.rig.replace(sources={**fit.rig.sources, "l_cg": "assumed"})
+    again = up.identify(log, rig)
+    assert again.study.model.parameters["l_cg"].assumed
+    assert "l_cg" in again.verdict
+
+
+@pytest.mark.parametrize("form", ["fit", "study", "log and rig"])
+def test_a_ladder_is_climbed_whatever_it_was_handed(form, fit, log):
+    handed = {"fit": (fit,), "study": (fit.study,), "log and rig": (log, fit.rig)}[form]
+    assert up.ladder(*handed).value.steps
+
+
+def test_a_rig_alone_has_no_runs():
+    for verb in (up.identify, up.ladder):
+        with pytest.raises(up.BadInput, match=rf"a rig has no runs; .* up.{verb.__name__}\(log, rig\)"):
+            verb(DRIVEN)
 
 
 def test_a_number_of_a_fit_is_asked_by_its_name(fit):
@@ -225,7 +275,8 @@ CALLS = {
     "track": lambda a, b: up.track(a if a is not None else 3),
     "doctor": lambda a, b: up.doctor(a, rig=b),
     "predict": lambda a, b: up.predict(a, b),
-    "ladder": lambda a, b: up.ladder(a),
+    "ladder": lambda a, b: up.ladder(a, b),
+    "ladder of a log": lambda a, b: up.ladder(SWING, a if a is not None else 3, known=b),
     "survey": lambda a, b: up.survey(a),
     "export": lambda a, b: up.export(a, to="mjcf"),
     "show": lambda a, b: up.show(a),

@@ -45,8 +45,9 @@ control
 rigs
 realtime
 report
+report.rig
 report.fit
-report.ladder report.law report.log report.rig
+report.ladder report.law report.log
 report.run
 live
 diagnosis questionnaire designing

@@ -15,7 +15,7 @@ from docs.notebook import CellFailed, alike, differences, executed
 from upright.physics import BUILT_IN
 
 ROOT = Path(__file__).parents[1]
-NOTEBOOKS = sorted((ROOT / "docs").glob("*.ipynb"))
+NOTEBOOKS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
 LARGEST = 200_000  # bytes, pictures included, so that a clone stays quick
 OWN_FOLDERS = re.compile(r"(?<![\w.:/])/(home|root|tmp|opt|Users|work|mnt|var)/|[A-Z]:\\\\")
 
@@ -86,7 +86,7 @@ def test_every_picture_and_table_of_a_notebook_is_introduced(path):
     ],
 )
 def test_the_derivation_of_eq_3_notices_a_mistake(right, wrong):
-    notebook = stored_in(ROOT / "docs" / "experiment_4.ipynb")
+    notebook = stored_in(ROOT / "docs" / "tutorials" / "experiment_4.ipynb")
     sources = [cell.source for cell in cells(notebook)]
     assert sum(right in source for source in sources) == 1
     with pytest.raises(CellFailed, match=r"cell 7 raises AssertionError"):
@@ -153,7 +153,7 @@ def test_numbers_may_differ_by_one_in_their_last_digit(stored, fresh, same):
 
 
 def test_the_nomenclature_is_that_of_the_plants():
-    assert (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8") == nomenclature.page()
+    assert (ROOT / "docs" / "reference" / "nomenclature.md").read_text(encoding="utf-8") == nomenclature.page()
 
 
 @pytest.mark.parametrize("plant", BUILT_IN)

@@ -19,6 +19,7 @@ from upright.records.columns import bare_name, stated_unit, take_time, time_scal
         ("t [ns]", 1e-9), ("time [min]", 0), ("t_us", 1e-6), ("time_ms", 1e-3),
         ("timestamp_ns", 1e-9), ("t_sec", 1), ("t_x", 0), ("theta", 0), ("theta_s", 0),
         ("Zeit (ms)", 1e-3), ("temps", 1), ("ms", 1e-3), ("\u00b5s", 1e-6), ("s", 0),  # s may be a position
+        ("millis", 1e-3), ("micros()", 1e-6), ("time_millis", 1e-3),
         ("", 0), ("x [ms]", 0), ("t" + " " * 199, 1),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""One term per thing: the words that docs/glossary.md replaced do not come back into the source."""
+"""One term per thing: the words that docs/reference/glossary.md replaced do not come back into the source."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_no_text_has_a_word_that_was_replaced():
 def test_a_word_is_defined_once_and_none_by_the_words_that_it_replaced():
     rows = [
         line.split("|")[1:3]
-        for line in (ROOT / "docs/glossary.md").read_text(encoding="utf-8").splitlines()
+        for line in (ROOT / "docs/reference/glossary.md").read_text(encoding="utf-8").splitlines()
         if line.startswith("| ")
     ]
     terms = [term.strip() for cell, _ in rows for term in cell.split(",") if cell.strip() != "term"]

@@ -258,7 +258,7 @@ def run(
     endings: dict[str, list[Ending]] = {}
     taken: dict[str, Spread] = {}
     for kind in ("furuta", "cart"):
-        rigs = [stranger(kind, seed) for seed in range(2 if quick else 20)]
+        rigs = [stranger(kind, seed) for seed in range(1 if quick else 20)]
         progress(f"{len(rigs)} rigs: {kind}")
         endings[kind], taken[kind] = of_each(met, rigs, workers)
     every = [e for each in endings.values() for e in each]

@@ -1,4 +1,4 @@
-"""How often is a fault that was put in found, and how often one that was not? Bounds as docs/doctor.md states."""
+"""How often is a fault that was put in found, and how often one that was not? Bounds as docs/howto/doctor.md states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the steps of docs/build.md come to what the page says, on the emulated Mega with an H-bridge?"""
+"""Do the steps of docs/tutorials/own_rig.md come to what the page says, on the emulated Mega with an H-bridge?"""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.designs import GAIN, PARAMETERS
 from tests.firmware.test_laboratory import RIG, STUDY
 from tests.firmware.test_pwm import STEPS, SUPPLY
 
-PAGE = (Path(__file__).parents[2] / "docs" / "build.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "tutorials" / "own_rig.md").read_text(encoding="utf-8")
 FOLLOWED = STUDY.replace('converter = "0.00030517578125 V"', f'converter = "{SUPPLY / STEPS} V"')
 """The study of a rig with its supply in steps of PWM, as step 3 asks."""
 SCALE = re.search(r"\[board\]\n +(full_scale = [\d.]+)\n", PAGE)[1]
@@ -71,8 +71,10 @@ def test_the_ceilings_of_step_5_are_the_limits_of_rig_toml(described, tmp_path):
 
 
 def test_every_command_and_picture_of_the_page_is_there():
-    root = Path(__file__).parents[2] / "docs"
-    for picture in re.findall(r"\]\((images/[^)]+)\)", PAGE):
+    root = Path(__file__).parents[2] / "docs" / "tutorials"
+    pictures = re.findall(r"\]\((\.\./images/[^)]+)\)", PAGE)
+    assert pictures
+    for picture in pictures:
         assert (root / picture).is_file()
     for words in re.findall(r"upright (firmware \w+|rig \w+)", PAGE):
         assert hasattr(up, words.replace(" ", "_"))

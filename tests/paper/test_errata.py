@@ -1,4 +1,4 @@
-"""Each misprint of the paper: what is printed fails, what is right holds. Numbered as in docs/errata.md."""
+"""Each misprint of the paper: what is printed fails, what is right holds. Numbered as in docs/explanation/errata.md."""
 
 from fractions import Fraction
 from math import ceil, floor

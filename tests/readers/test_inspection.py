@@ -191,7 +191,8 @@ def test_any_valid_record_can_be_inspected(rows: list[tuple[float, float, float,
     ("name", "unit"),
     [
         ("x_m", "m"), ("pos_mm", "mm"), ("theta_rad", "rad"), ("theta_deg", "deg"), ("pendulum_angle_deg", "deg"),
-        ("x", "m"), ("theta_m", "rad"), ("u_m", ""), ("theta_dot_deg", "rad/s"),
+        ("x", "m"), ("theta_m", "rad"), ("u_m", ""), ("theta_dot_deg", "rad/s"), ("cart_cm", "cm"), ("cart_m", "m"),
+        ("tilt_deg", "deg"), ("slider_mm", "mm"), ("motor_m", ""),
     ],
 )  # fmt: skip
 def test_a_unit_behind_the_name_of_a_place_is_its_own(name: str, unit: str) -> None:

@@ -95,18 +95,18 @@ def test_the_cover_shows_verdicts_and_numbers_of_their_own_chapters():
     assert facts.content[0].pairs == (("when", "now"),)
     table = glance.content[0]
     assert table.rows == (
-        ("1", "T1", "rig 1", "V1", "sound"), ("2", "T2", "rig 2", "V2", "with reservations"),
+        ("1", "T1", "rig 1", "V1", "supported"), ("2", "T2", "rig 2", "V2", "with reservations"),
         ("4", "T4", "rig 4", "V4", "not finished"), ("3", "Tracking", "", "", "not run"),
     )  # fmt: skip
-    assert table.headings[table.badge] == "it is"
+    assert table.headings[table.badge] == "state"
     assert table.anchors == ("experiment-1", "experiment-2", "experiment-4")
-    assert "truth" in glance.content[1]
+    assert "true values" in glance.content[1]
     numbers = found.content[0]
     assert (numbers.headings[-1], numbers.rows) == ("truth", (("1", "J", "2", "1 to 3", "2.5"),))
     assert (numbers.numbers, numbers.anchors) == ((2, 3, 4), ("experiment-1",))
     real = Book(title="B", facts=(), chapters=(chapter("1", KeyNumber(what="J", value="2", interval="1 to 3")),))
     _, glance, found = real.cover
-    assert "twin" not in glance.content[1]
+    assert "true values" not in glance.content[1]
     assert found.content[0].headings == ("from", "quantity", "value", "95 % interval")
     assert (found.content[0].rows, found.content[0].numbers) == ((("1", "J", "2", "1 to 3"),), (2, 3))
     assert len(Book(title="B", facts=(), chapters=(chapter("1"),)).cover) == 2

@@ -23,7 +23,7 @@ LAW = state_feedback([1.2, 0.03, -4.0, 0.2], 2e-3, memory=0.6, k_pf=0.8, limit=2
 
 
 def ran(board, counts, references):
-    """Commands [steps] and memories, as docs/firmware.md has the loop, in float32."""
+    """Commands [steps] and memories, as docs/reference/firmware.md has the loop, in float32."""
     z, u, kept = board.initial + board.begin @ (counts[0] - board.target), [], []
     for now, r in zip(counts, references, strict=True):
         out = board.matrix @ np.concatenate([z, now - board.target, [r]]).astype(np.float32)

@@ -197,7 +197,7 @@ def test_a_changed_description_is_refused(cart, tmp_path, change, words):
 
 
 def test_the_example_of_the_page_describes_a_rig(tmp_path, log):
-    page = (Path(__file__).parents[2] / "docs" / "study.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "study.md").read_text(encoding="utf-8")
     example = re.findall(r"```toml\n(.*?)```", page.partition("## The rig as a loop sees it")[2], re.DOTALL)[0]
     np.savetxt(tmp_path / "log.csv", log, "%.9f", ",", header="t,u,x,theta", comments="")
     rest = CART.partition("[parameters]")[2].partition("[actuator]")[0]

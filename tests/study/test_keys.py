@@ -11,7 +11,7 @@ from upright.study.expressions import FUNCTIONS
 from upright.study.keys import SECTIONS, write_reference
 from upright.study.load import load_study
 
-PAGE = Path(__file__).parents[2] / "docs" / "study.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "study.md"
 
 
 def test_the_page_is_what_the_keys_say():

@@ -193,7 +193,7 @@ def test_some_runs_are_held_out_and_never_all():
     ("text", "sentence"),
     [
         (RIG + SENSORS, "a study needs at least one run"),
-        (RIG + SENSORS + "runs = []\n", "a study needs at least one run"),
+        ("runs = []\n" + RIG + SENSORS, "a study needs at least one run"),
         ("ladder = 3\n" + TWO, "a ladder is a list of rungs"),
         (TWO + '[[ladder]]\nname = "x"\nadds = ["zeta"]\n', "adds lists"),
         (TWO + '[[ladder]]\nadds = ["b_2"]\n', "needs name as text"),

@@ -43,6 +43,18 @@ def test_every_argument_and_option_of_a_command_is_explained(name):
     assert [p.name for p in command(name).params if not p.help] == []
 
 
+VERBS = [name for name in up.__all__ if callable(getattr(up, name)) and not isinstance(getattr(up, name), type)]
+MOST = 11
+"""Parameters of a verb: about ten, and where there are more, a rig, a record or an options object has the rest."""
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_a_verb_has_about_ten_parameters_and_what_is_missing_is_none(name):
+    about = signature(getattr(up, name)).parameters
+    assert len(about) <= MOST
+    assert [p.name for p in about.values() if p.default in ("", ())] == []
+
+
 @pytest.mark.parametrize(
     ("typed", "offered"), [("upright swi", {"swing-up"}), ("upright doctor --r", {"--rig", "--reader"})]
 )

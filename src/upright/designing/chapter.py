@@ -288,7 +288,7 @@ def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
         Step(f"Simulate it: upright.laws.of_values makes the law of what stands as law in {folder}/design.json.")
     )  # fmt: skip
     if not plain_matrices:
-        steps.append(Step("Run it on the rig, or on its twin (RIG.toml: docs/rigs.md).",
+        steps.append(Step("Run it on the rig, or on its twin (RIG.toml: docs/howto/rigs.md).",
                           f"upright run --rig RIG.toml --law {folder}/design.json"))  # fmt: skip
     return steps
 

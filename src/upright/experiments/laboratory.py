@@ -122,7 +122,7 @@ def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | No
             if live is not None:
                 raise BadInput(
                     f"experiment {name} cannot be made on {make}, which {has}; "
-                    "docs/lab.md says what each asks of a rig."
+                    "docs/howto/lab.md says what each asks of a rig."
                 )
             raise BadInput(f"experiment {name} is for --rig {' or '.join(named[0].makes)}; {make} {has}.")
         wanted |= {e.key for e in named if e in there}

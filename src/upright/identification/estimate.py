@@ -21,9 +21,8 @@ from upright.identification.inference.black_box import black_box
 from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
 from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
-from upright.identification.inference.lateness import lateness
 from upright.identification.inference.loop import standing
-from upright.identification.inference.neglected import neglected, with_force
+from upright.identification.inference.neglected import is_driven, lateness, neglected, with_force
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.ties import ties, with_ties
@@ -313,7 +312,7 @@ def _conclude(
             lost=best.lost,
             nothing=best.explains_nothing,
             ties=tied,
-            driven=any(np.any(track.u) or track.run.loop is not None for track in problem.tracks),
+            driven=is_driven(best),
         )
     )
     return Fit(
@@ -353,7 +352,10 @@ def _scores(
     fitted = [run for run in runs if run.role == "fit"]
     thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
     whole = formulate(rig, fitted, thin=False) if thinned else problem
-    scores = {run.label: score_run(whole, i, best.x, ahead) for i, run in enumerate(fitted)}
+    scores = {
+        run.label: replace(score_run(whole, i, best.x, ahead), guess=score_run(whole, i, whole.start, ahead).simulated)
+        for i, run in enumerate(fitted)
+    }
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     others = [r for r in runs if r.role != "fit"]

@@ -2,7 +2,7 @@
 
 Tables 1, 2 and 4 stand here as text, so that the digits printed tell the rounding.
 Each misprint in numbers: what is printed and what is right, beside what the energies give (in symbols:
-docs/errata.md). Rigs are drawn at random; a formula that holds misses by rounding on every one.
+docs/explanation/errata.md). Rigs are drawn at random; a formula that holds misses by rounding on every one.
 """
 
 from __future__ import annotations

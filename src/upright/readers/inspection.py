@@ -24,10 +24,12 @@ _SHOWN = 12  # switches, gaps and rests beyond these tell nothing new
 _ANGLE = re.compile(r"theta|phi|psi|alpha|beta|angle|arm|joint.*position|pend", re.IGNORECASE)
 _RATE = re.compile(r"velocity|speed|rate|_dot|omega|qd", re.IGNORECASE)
 _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
-_LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement)\d*$", re.IGNORECASE)
-_PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|mm)", re.IGNORECASE)
+_LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement|cart|carriage)\d*$", re.IGNORECASE)
+_PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|cm|mm)", re.IGNORECASE)
 _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
-_EFFORT = re.compile(r"(?i:u|v|i|f|t|tau)_?(?i:\d|m|motor)?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*")
+_EFFORT = re.compile(
+    r"(?i:u|v|i|f|t|tau|motor|force|moment)_?(?i:\d|m|motor)?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*"
+)
 EFFORTS = ("V", "A", "N", "N m")
 _DRIVE = re.compile(
     r"^([uv]_?m?|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref",
@@ -202,12 +204,12 @@ def _guess_unit(name: str, values: Array, step: Resolution) -> str:
 
 
 def _place_unit(name: str) -> str:
-    """Unit behind a place's name, ``theta_deg`` or ``x_mm``; empty where there is none: ``theta_m`` is a motor's."""
+    """Unit behind a place's name, ``tilt_deg`` or ``cart_cm``; a metre only of a length: ``theta_m`` is a motor's."""
     match = _PLACE.fullmatch(name)
     if match is None:
         return ""
-    like = _ANGLE if match["unit"].lower() in ("rad", "deg") else _LENGTH
-    return match["unit"].lower() if like.search(match["stem"]) else ""
+    unit = match["unit"].lower()
+    return unit if unit != "m" or _LENGTH.search(match["stem"]) else ""
 
 
 def effort_unit(name: str) -> str:

@@ -23,12 +23,14 @@ _SPELLED = {"\u00b0": "deg", "degree": "deg", "degrees": "deg", "radian": "rad",
 _LONGEST = 200  # characters of a name that is looked into
 # the names are case-folded, which makes the micro sign a Greek letter
 _UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9}
+_UNIT_SUFFIX |= {"msec": 1e-3, "usec": 1e-6}
+_UNIT_SUFFIX |= {"millis": 1e-3, "millis()": 1e-3, "micros": 1e-6, "micros()": 1e-6}  # Arduino's clocks
 
 
 def time_scale(name: str) -> float:
     """Seconds per unit of a column that is called like a time; 0 when it is not.
 
-    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"``, ``"t_us"`` and ``"ms"`` are.
+    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"``, ``"t_us"``, ``"ms"`` and Arduino's ``"millis"`` are.
     """
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name[:_LONGEST].casefold())
     stem, unit = (match[1], match[2] or "") if match else ("", "")

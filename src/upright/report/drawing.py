@@ -44,6 +44,11 @@ CYCLE = (
     (BLACK, (0, (3, 3))),
 )
 """Colour and line style of the n-th curve."""
+_ON_DARK = {
+    BLACK: "black", ORANGE: "orange", SKY: "sky", GREEN: "green", BLUE: "blue", VERMILLION: "vermillion",
+    PURPLE: "purple", GREY: "grey", "#ffffff": "white", "#e4e4e4": "grid",
+}  # fmt: skip
+"""Custom properties of a page's style that may replace a colour of a picture, ``--mpl-blue`` and so on."""
 
 WIDTH = 7.4  # inches; a column of the page
 _STYLE: dict[Any, Any] = {
@@ -132,7 +137,9 @@ def svg(drawing: Figure, name: str) -> str:
     """Markup of a figure to stand inside a page; ids begin with `name`, so that several figures can share it."""
     page = StringIO()
     with _undisturbed():
-        drawing.savefig(page, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+        drawing.savefig(
+            page, format="svg", transparent=True, metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
+        )
     text = page.getvalue()
     text = text[text.index("<svg") :]
     # `Figure.savefig` writes six decimals; a hundredth of a point is finer than any printer
@@ -141,11 +148,24 @@ def svg(drawing: Figure, name: str) -> str:
     text = re.sub(r"(url\(#|href=\"#)", rf"\1{name}-", text)
     text = re.sub(r'\s(xmlns|xmlns:xlink|version)="[^"]*"', "", text)
     text = re.sub(r"\n\s*", "\n", text)
+    text = re.sub(r'(?<= style=")[^"]*#[^"]*', _with_properties, text)
     opening = text[: text.index(">")]
     responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
     return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
 
+
+def _with_properties(style: re.Match[str]) -> str:
+    """A style whose colours a page may replace, in the dark; text is black where nothing is said."""
+    return re.sub(r"#[0-9a-fA-F]{6}\b", _replaceable, style[0])
+
+
+def _replaceable(colour: re.Match[str]) -> str:
+    name = _BY_HEX.get(colour[0].lower())
+    return f"var(--mpl-{name}, {colour[0]})" if name else colour[0]
+
+
+_BY_HEX = {colour.lower(): name for colour, name in _ON_DARK.items()}
 
 PICTURES = (".svg", ".png")
 """Endings of files that a picture is written to."""

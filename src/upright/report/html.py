@@ -1,24 +1,67 @@
-"""Pages as HTML: one file, figures as SVG, formulas as MathML, style inside, nothing fetched from anywhere."""
+"""Pages as HTML: one file, figures as SVG, formulas as MathML, style and script inside, nothing fetched."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import math
 import re
+from collections.abc import Iterator, Sequence
+from html import unescape
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from upright.files import replace_file
-from upright.report.page import Book, Chapter, Picture
+from upright.report.page import Block, Book, Chapter, KeyNumber, Live, Part, Picture, Table
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.S)
+_SENTENCE = re.compile(r"(?<=[.!?:]) (?=[A-ZΑ-Ω0-9])")
+WORDS_OF_A_VERDICT = 120
+"""A chapter shows no more of them before something is opened."""
+
+_MARKS = {
+    "ok": "well determined|kept|supported|yes|inside|healthy|stabilised|finished",
+    "no": "no|not supported|refused|failed|outside|unseen|lost",
+    "none": "not tested|not run|not asked|given|assumed|known|left out|nuisance|–",
+}
+SCALES = (1, 5, 20, 50, 100)
+"""Half a scale of intervals in percent of the estimate."""
 
 
 def html_page(page: Chapter | Book) -> str:
     """A chapter, or a whole report, as a page that can be mailed, printed and read in ten years; texts are escaped."""
     from upright._version import __version__
 
-    return _rendered("page.html", page=page, version=__version__)
+    chapters = page.chapters if isinstance(page, Book) else (page,)
+    scripts = list(dict.fromkeys(s for c in chapters for b in _blocks(c) if (s := getattr(b, "script", ""))))
+    text = _rendered("page.html", page=page, version=__version__, scripts=scripts)
+    return text.replace("<!-- policy -->", _policy(text, chapters), 1)
+
+
+def _blocks(chapter: Chapter) -> Iterator[Block]:
+    return (b for p in chapter.parts for b in p.content)
+
+
+def _policy(text: str, chapters: Sequence[Chapter]) -> str:
+    """Content-security policy: nothing but what stands in this page, and in the pages that it frames."""
+    own = {f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in _SCRIPT.findall(text)}
+    framed = {
+        word
+        for c in chapters
+        for b in _blocks(c)
+        if isinstance(b, Live)
+        for sources in re.findall(r"script-src ([^;\"]*)", unescape(b.markup))
+        for word in sources.split()
+    }
+    allowed = " ".join(sorted(own | framed)) or "'none'"
+    workers = " worker-src blob:;" if framed else ""
+    return (
+        '<meta http-equiv="Content-Security-Policy" content="'
+        f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed};{workers}\">"
+    )
 
 
 def fragment(page: Chapter) -> str:
@@ -48,7 +91,63 @@ def _rendered(template: str, **values: Any) -> str:
         """Mark-up of a picture, with ids that no other chapter of the page has."""
         return Markup(_ID.sub(rf"\g<1>{prefix}", picture.svg))
 
-    return rendered("upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__)
+    return rendered(
+        "upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__,
+        mark=mark, breadth=breadth, sentences=sentences, brief=brief, scale=scale, evidence=evidence,
+    )  # fmt: skip
+
+
+def mark(state: str) -> str:
+    """Class of a badge by its word: ``ok``, ``care``, ``no`` or ``none``."""
+    word = state.split(" (")[0].split(",")[0]
+    return next((name for name, words in _MARKS.items() if word in words.split("|")), "care")
+
+
+def breadth(table: Table) -> str:
+    """How wide a screen has to be for it to stand as a table: ``narrow``, ``medium`` or ``broad``."""
+    columns = zip(table.headings, *table.rows, strict=True)
+    held = [max(max(map(len, cell.split() or [""])) for cell in c) if i not in table.numbers else max(map(len, c))
+            for i, c in enumerate(columns)]  # fmt: skip
+    letters = sum(h + 2 for h in held)
+    return "narrow" if letters <= 62 else "medium" if letters <= 84 else "broad"
+
+
+def sentences(text: str) -> list[str]:
+    """A text sentence by sentence."""
+    return _SENTENCE.split(text) if text else []
+
+
+def brief(chapter: Chapter) -> tuple[str, str, str, str]:
+    """Headline, the rest of the verdict, what of its detail is shown at once, and what is folded."""
+    headline, *rest = sentences(chapter.verdict) or [""]
+    words = len(f"{chapter.title} {chapter.question} {chapter.verdict} {chapter.first_line}".split())
+    words += sum(len(f"{a.question} {a.state} {a.why}".split()) for a in chapter.assessments)
+    shown: list[str] = []
+    assessed = " ".join(a.why for a in chapter.assessments)
+    more = [s for s in sentences(chapter.detail) if s not in assessed]
+    while more and (words := words + len(more[0].split())) <= WORDS_OF_A_VERDICT:
+        shown.append(more.pop(0))
+    return headline, " ".join(rest), " ".join(shown), " ".join(more)
+
+
+def scale(numbers: Sequence[KeyNumber]) -> int:
+    """Half a scale [%] that the intervals of several numbers share, so that widths compare; a fifth may leave it."""
+    halves = sorted(100 * n.half for n in numbers if n.half is not None and math.isfinite(n.half))
+    most = halves[-1 - len(halves) // 5] if halves else 0.0
+    return next((s for s in SCALES if s >= most), SCALES[-1])
+
+
+def evidence(chapter: Chapter) -> tuple[list[tuple[int, Part]], list[tuple[int, Part]]]:
+    """Parts, with their numbers, that are shown, and those that a screen folds; without what the first screen shows."""
+    best = chapter.picture
+    shown: list[tuple[int, Part]] = []
+    folded: list[tuple[int, Part]] = []
+    for i, part in enumerate(chapter.parts, start=1):
+        if part.content and all(b is best for b in part.content):
+            continue
+        hidden = part.folded or (part.aside and not any(isinstance(b, Live) for b in part.content))
+        (folded if hidden else shown).append((i, part))
+    return shown, folded
 
 
 def write_html(path: Path, page: Chapter | Book) -> Path:

@@ -101,12 +101,29 @@ class Picture:
     draw : callable or str
         Gives the matplotlib figure, when somebody looks; or its markup.
     caption, description : str
+    interactive : callable or str
+        Gives what a page on a screen draws in its place, from `report.interactive`; nothing when empty.
     """
 
     name: str
     draw: Callable[[], Any] | str
     caption: str
     description: str
+    interactive: Callable[[], str] | str = ""
+
+    @cached_property
+    def answers(self) -> str:
+        """What a page's script takes to draw it."""
+        return self.interactive if isinstance(self.interactive, str) else self.interactive()
+
+    @property
+    def script(self) -> str:
+        """The script that draws it, which stands once in a page."""
+        if not self.answers:
+            return ""
+        from upright.report.interactive.script import script
+
+        return script()
 
     @cached_property
     def svg(self) -> str:
@@ -149,22 +166,43 @@ class Part:
         Anchor on the page; its number when empty.
     aside : bool
         Whether a terminal leaves all of it to the page.
+    folded : bool
+        Whether a screen shows only its heading until it is opened: evidence.
+    result : str
+        What it comes to in a few words, beside the heading.
     """
 
     title: str
     content: tuple[Block, ...] = ()
     key: str = ""
     aside: bool = False
+    folded: bool = False
+    result: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class KeyNumber:
-    """A number for the cover, as text: what it is, its value and, where there are such, interval and truth."""
+    """A number for the first screen, as text: what it is, its value and, where there are such, interval and truth.
+
+    `meaning` says what a symbol stands for, `half` is half the interval relative to the value.
+    """
 
     what: str
     value: str
+    unit: str = ""
     interval: str = ""
     truth: str = ""
+    meaning: str = ""
+    half: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assessment:
+    """One question that a verdict answers: how it turned out in a word or two, and why."""
+
+    question: str
+    state: str
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -201,6 +239,14 @@ class Chapter:
         False where the work was stopped or failed.
     first_line : str
         What stands before everything else: that it was simulated, that its model is not to be trusted.
+    assessments : tuple of Assessment
+        The questions that the verdict answers.
+    drawing : Picture, optional
+        The rig with its coordinates and signs.
+    best : str
+        Name of the picture for the first screen; the first of all when empty.
+    sources : tuple of str
+        Literature, as a bibliography has it.
     """
 
     title: str
@@ -217,6 +263,16 @@ class Chapter:
     about: str = ""
     finished: bool = True
     first_line: str = ""
+    assessments: tuple[Assessment, ...] = ()
+    drawing: Picture | None = None
+    best: str = ""
+    sources: tuple[str, ...] = ()
+
+    @property
+    def picture(self) -> Block | None:
+        """The picture for the first screen."""
+        named = {b.name: b for p in self.parts for b in p.content if isinstance(b, Picture)}
+        return named.get(self.best, next(iter(named.values()), None))
 
     @property
     def anchor(self) -> str:
@@ -226,7 +282,7 @@ class Chapter:
     @property
     def state(self) -> str:
         """How far the verdict carries, in a word or two."""
-        return "not finished" if not self.finished else "sound" if self.sound else "with reservations"
+        return "not finished" if not self.finished else "supported" if self.sound else "with reservations"
 
 
 def resting_on(chapter: Chapter, basis: Basis, performed: str = "") -> Chapter:
@@ -254,12 +310,11 @@ def simulated(chapter: Chapter) -> Chapter:
 
 
 READING = (
-    "A verdict is sound when what it says may be built on; with reservations, when its chapter says what stands in the "
-    "way. Intervals are meant to hold the truth in 95 of 100 rigs. Data go one way: later experiments take what "
-    "earlier ones found, with its errors."
+    "Supported: rely on it. With reservations: read the caveats in its chapter. Intervals should hold the true value "
+    "on 95 of 100 rigs. Later experiments use the estimates of earlier ones, with their errors."
 )
 """How the cover is meant."""
-TWIN = "No fit sees the twin's truth, which stands beside the result to judge it."
+TWIN = "The true values are known of simulated rigs only; no fit uses them."
 """How the truth on it is meant, where there is one."""
 
 
@@ -287,6 +342,30 @@ class Book:
     notes: tuple[str, ...] = ()
     missing: tuple[tuple[str, str], ...] = ()
     steps: tuple[Step, ...] = ()
+    sources: tuple[str, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """How many verdicts can be relied on, and which cannot."""
+        reserved = [c.key for c in self.chapters if c.state != "supported"]
+        if not self.chapters:
+            return "No experiment was run."
+        if not reserved:
+            return f"All {len(self.chapters)} experiments support their verdicts."
+        of = f"{len(self.chapters) - len(reserved)} of {len(self.chapters)} experiments support their verdicts"
+        return f"{of}; read the caveats of {', '.join(reserved)}."
+
+    @property
+    def drawings(self) -> tuple[Picture, ...]:
+        """The rigs, each once."""
+        return tuple({c.drawing.caption: c.drawing for c in self.chapters if c.drawing is not None}.values())
+
+    @property
+    def numbers(self) -> tuple[KeyNumber, ...]:
+        """Five for the first screen: of every chapter its first, then those with intervals."""
+        firsts = [c.findings[0] for c in self.chapters if c.findings]
+        others = [f for c in self.chapters for f in c.findings[1:] if f.interval]
+        return tuple([*firsts, *others][:5])
 
     @cached_property
     def cover(self) -> tuple[Part, ...]:
@@ -296,12 +375,13 @@ class Book:
         findings = [(c, f) for c in self.chapters for f in c.findings]
         verdicts = Table(
             caption="One line for each experiment; every verdict is argued in its chapter",
-            headings=("", "experiment", "rig", "verdict", "it is"), rows=tuple(glance), badge=4,
+            headings=("", "experiment", "rig", "verdict", "state"), rows=tuple(glance), badge=4,
             anchors=tuple(c.anchor for c in self.chapters),
         )  # fmt: skip
         twin = any(f.truth for _, f in findings)
         numbers = Table(
-            caption="Key numbers with 95 % intervals" + (", beside the truth that only a twin can tell" * twin),
+            caption="Key numbers with 95 % intervals" + (", beside the true values of the simulated rigs" * twin),
+            folded=f"All {len(findings)} key numbers with their intervals",
             headings=("from", "quantity", "value", "95 % interval", "truth")[: 4 + twin],
             rows=tuple((c.key, f.what, f.value, f.interval, f.truth)[: 4 + twin] for c, f in findings),
             numbers=(2, 3, 4)[: 2 + twin], anchors=tuple(c.anchor for c, _ in findings),
@@ -313,13 +393,14 @@ class Book:
                 key="verdicts",
                 content=(verdicts, f"{READING} {TWIN}" if twin else READING),
             ),
-            *((Part(title="What was found", key="numbers", content=(numbers,)),) if findings else ()),
+            *((Part(title="Key numbers", key="numbers", content=(numbers,)),) if findings else ()),
         )
 
 
 _KINDS: dict[str, Callable[..., Any]] = {
-    kind.__name__: kind for kind in (Chapter, Code, Facts, KeyNumber, Formula, Part, Picture, Points, Step, Table)
-}
+    kind.__name__: kind for kind in (Assessment, Chapter, Code, Facts, KeyNumber, Formula, Part, Picture, Points, Step,
+                                             Table)
+}  # fmt: skip
 
 
 def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> Any:
@@ -332,7 +413,7 @@ def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> 
     if isinstance(value, Symbol):
         return {"kind": "Symbol", "text": str(value)}
     if isinstance(value, Picture):
-        value = replace(value, draw=value.svg)
+        value = replace(value, draw=value.svg, interactive=value.answers)
     if isinstance(value, Mapping):
         return plain_values(value)
     if is_dataclass(value):

@@ -1,4 +1,4 @@
-"""What may a study say? Every key with its form and meaning; the check and `docs/study.md` both come from here."""
+"""Every key of a study, with its form and meaning; the check and docs/reference/study.md both come from here."""
 
 from __future__ import annotations
 
@@ -255,5 +255,5 @@ if __name__ == "__main__":
     import sys
     from pathlib import Path
 
-    file = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/study.md")
+    file = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/reference/study.md")
     file.write_text(write_reference(file.read_text(encoding="utf-8")), encoding="utf-8")

@@ -109,7 +109,7 @@ def load_study(
     Parameters
     ----------
     path : path-like
-        TOML file; see `docs/study.md`.
+        TOML file; see `docs/reference/study.md`.
     data : path-like, optional
         Folder that the runs' files are relative to; the study's own when omitted.
     fixed : mapping of str to float, optional

@@ -13,6 +13,7 @@ from upright.physics import Plant, find
 from upright.physics.actuator import ACTUATOR
 from upright.quantities import Quantity
 from upright.study.keys import names
+from upright.study.sensors import assumed_scales
 from upright.study.text import SOURCES, Section, as_written, in_si
 from upright.trust import before_running
 from upright.units import uncertainty
@@ -70,7 +71,10 @@ def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping
         parameters[name] = read(actuator, key, name, what, lambda number=number: number.default)
     rig = study.section("rig")
     substeps = rig.whole("substeps", 1, most=SUBSTEPS)
-    return GreyBox(plant=plant, parameters=parameters, substeps=substeps, guessed=rig.flag("guessed"))
+    return GreyBox(
+        plant=plant, parameters=parameters, substeps=substeps, guessed=rig.flag("guessed"),
+        assumed_scales=assumed_scales(study, plant),
+    )  # fmt: skip
 
 
 def _default(study: Section, plant: type[Plant], name: str) -> float:

@@ -242,6 +242,17 @@ def read_sensors(study: Section, run: Section, plant: type[Plant]) -> dict[str, 
     return out
 
 
+def assumed_scales(study: Section, plant: type[Plant]) -> dict[str, float]:
+    """Counts per turn or metre that nobody measured, of sensors whose columns are in counts."""
+    out: dict[str, float] = {}
+    for name, (sensor, section) in read_sensors(study, Section(study.text, (), {}), plant).items():
+        for key, unit in (("counts_per_rev", "1"), ("counts_per_m", "1/m")):
+            if key in section and sensor.unit and units.same_dimension(sensor.unit, "counts"):
+                counts, source = section.stated(key, unit)
+                out |= {f"sensors.{name}.{key}": counts} if source == "assumed" else {}
+    return out
+
+
 def read_sensor(section: Section, coordinate: Coordinate, plant: type[Plant]) -> Sensor:
     """One sensor."""
     name = coordinate.name

@@ -62,7 +62,7 @@ class Answer(Generic[V]):
         """Names of the pictures that `plot` draws."""
         return tuple(self._drawings())
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Matplotlib figure of the chapter's first picture, or of the one called `name`.
 
         Raises

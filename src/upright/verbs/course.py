@@ -48,7 +48,7 @@ class Laboratory:
 
 def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     """A twin asks nobody for anything, and its runs are not watched."""
-    return typed if typed["rig"].endswith(".toml") else {**typed, "ask": None, "watching": None}
+    return typed if (typed["rig"] or "").endswith(".toml") else {**typed, "ask": None, "watching": None}
 
 
 @command(
@@ -79,9 +79,9 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 )
 @renamed(WORN)
 def lab(
-    *, experiment: Sequence[str] | str = (), rig: str = "", seed: int = 0, out: str | os.PathLike[str] | None = None,
-    fresh: bool = False, quick: bool = False, workers: Workforce = 1, nonideal: bool = False, accept: str = "",
-    progress: Progress = silent,
+    *, experiment: Sequence[str] | str | None = None, rig: str | None = None, seed: int = 0,
+    out: str | os.PathLike[str] | None = None, fresh: bool = False, quick: bool = False, workers: Workforce = 1,
+    nonideal: bool = False, accept: str | None = None, progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
@@ -136,7 +136,7 @@ def lab(
 
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
-    rig = os.fspath(rig) if isinstance(rig, os.PathLike) else rig
+    rig = os.fspath(rig) if isinstance(rig, os.PathLike) else "" if rig is None else rig
     if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
         raise BadInput(f"a laboratory's rig is a make, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
     itself = rig.endswith(".toml") or rig.startswith("serial:")
@@ -161,7 +161,11 @@ def lab(
     shared = Workers.of(workers)
     requested = _requested(texts(experiment), itself, quick=quick)
     beside = Path() if out is None else at
-    live = _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept) if itself else None
+    live = (
+        _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept or "")
+        if itself
+        else None
+    )
     rig = rig if live is None else typed(live.file.path)
     laboratory.chosen_experiments(requested, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:

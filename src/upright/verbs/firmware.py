@@ -84,7 +84,7 @@ def firmware_build(
     """,
 )
 def firmware_flash(
-    *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None, port: str = "",
+    *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None, port: str | None = None,
     out: str | os.PathLike[str] = "upright-firmware", hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
     """Build the image and write it onto the board: port found, you asked, read back, greeted.
@@ -97,7 +97,7 @@ def firmware_flash(
         As of `firmware_build`.
     rig : path, optional
         RIG.toml whose [limits] are compiled in as ceilings.
-    port : str
+    port : str, optional
         Where the board is; found where it is left out.
     out : path
         Folder for the image.
@@ -121,7 +121,7 @@ def firmware_flash(
 
     made = board_of(board)
     image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
-    flashed = flash(made, image.path, port, hand=hand)
+    flashed = flash(made, image.path, port or "", hand=hand)
     return Answer(
         flashed,
         Chapter(

@@ -14,7 +14,7 @@ from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs, regular, replace_file
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.pages import can_be_pdf, folder, folder_if_given, write_page
+from upright.verbs.pages import folder, folder_if_given, pdf_has_folder, write_page
 from upright.verbs.values import open_log, texts
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from upright.verbs.values import Log
 
 
-def read(file: Log, *, reader: str = "", time_unit: str = "") -> Record:
+def read(file: Log, *, reader: str | None = None, time_unit: str | None = None) -> Record:
     """Record of a log as its program wrote it.
 
     Parameters
@@ -57,7 +57,7 @@ def read(file: Log, *, reader: str = "", time_unit: str = "") -> Record:
 
 @keeps_its_inputs
 def show(
-    log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False, time_unit: str = ""
+    log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False, time_unit: str | None = None
 ) -> Answer[Inspection]:
     """What a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
@@ -103,9 +103,13 @@ def show(
     return Answer(inspection, replace(chapter(record, inspection), steps=(onward,), numbers=numbers), files)
 
 
-@command("Log", name="show", defaults={"out": "."}, metavars={"time_unit": "UNIT"}, more="upright show swing.csv")
+@command("Log", name="show", metavars={"time_unit": "UNIT"}, more="upright show swing.csv")
 def show_logs(
-    logs: Sequence[str | os.PathLike[str]], *, out: str | os.PathLike[str] = "", plot: bool = True, time_unit: str = ""
+    logs: Sequence[str | os.PathLike[str]],
+    *,
+    out: str | os.PathLike[str] = ".",
+    plot: bool = True,
+    time_unit: str | None = None,
 ) -> Iterator[Answer[Inspection]]:
     """Print and draw what a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
@@ -157,6 +161,7 @@ def _stem(log: Path) -> str:
     names={"html": "-o --html"},
     metavars={"rig": "RIG", "html": "FILE"},
     helps={"rig": "Plant (furuta, torsional-2, ...), study (TOML) or fit.json of the rig."},
+    prepare=lambda typed: typed if typed["html"] or not typed["pdf"] else {**typed, "html": _page_of(typed["log"])},
     wrong=lambda answer: bool(answer.value.wrong),
     more="""
         upright doctor run.csv
@@ -171,8 +176,8 @@ def _stem(log: Path) -> str:
 )
 @keeps_its_inputs
 def doctor(
-    log: Log, *, rig: Any = "", html: str | os.PathLike[str] | None = None, pdf: bool = False,
-    reader: str = "",
+    log: Log, *, rig: str | Any = None, html: str | os.PathLike[str] | None = None, pdf: bool = False,
+    reader: str | None = None,
 ) -> Answer[Diagnosis]:  # fmt: skip
     """Say in plain sentences what looks wrong with a log, on which evidence, and what to do.
 
@@ -190,7 +195,7 @@ def doctor(
     html : path, optional
         Page to write, with a picture of every finding.
     pdf : bool
-        Write the page as PDF too; LOG-doctor.html here when no page is named.
+        Write the page as PDF beside it.
     reader : str, optional
         Reader of the log, when it is not recognised.
 
@@ -208,9 +213,9 @@ def doctor(
     from upright.diagnosis.chapter import chapter
     from upright.verbs.handover import called
 
-    can_be_pdf(pdf)
+    pdf_has_folder(html, pdf)
     path = _file(log)
-    page = Path(html) if html is not None else Path(f"{path.stem if path else 'log'}-doctor.html") if pdf else None
+    page = None if html is None else Path(html)
     if page is not None and page.is_dir():
         raise BadInput(f"--html needs a file, and {page} is a folder; name one in it, such as {page / 'doctor.html'}")
     mended: tuple[Finding, ...] = ()
@@ -218,13 +223,23 @@ def doctor(
     if path is not None:
         from upright.diagnosis.clock import read_mended
 
-        record, mended = read_mended(path, reader=reader)
+        record, mended = read_mended(path, reader=reader or "")
     else:
         record, path = open_log(log)
     diagnosis = examine(record, known, wiring, before=mended)
-    written = chapter(diagnosis, log=path, rig=rig if isinstance(rig, str) else called(rig), page=page is not None)
+    written = chapter(
+        diagnosis,
+        log=path,
+        rig="" if rig is None else rig if isinstance(rig, str) else called(rig),
+        page=page is not None,
+    )
     written = replace(written, numbers=_plain_diagnosis(diagnosis, page))
     return Answer(diagnosis, written, [] if page is None else write_page(written, page, pdf))
+
+
+def _page_of(log: Path) -> Path:
+    """Where a command writes the page of a log that it is asked to print."""
+    return Path(f"{log.stem}-doctor.html")
 
 
 def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]:
@@ -233,8 +248,10 @@ def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]
     from upright.physics import Plant
     from upright.verbs.handover import rig_of
 
+    if rig is None or rig == "":
+        return None, None
     if isinstance(rig, str | os.PathLike):
-        return read_known(str(rig), log) if str(rig) else (None, None)
+        return read_known(str(rig), log)
     if isinstance(rig, type) and issubclass(rig, Plant):
         return rig, None
     return rig_of(rig, "doctor", draws=0), None
@@ -286,7 +303,8 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
 )
 @keeps_its_inputs
 def init(
-    log: Log, *, out: str | os.PathLike[str] | None = None, plant: str = "", reader: str = "", time_unit: str = "",
+    log: Log, *, out: str | os.PathLike[str] | None = None, plant: str | None = None, reader: str | None = None,
+    time_unit: str | None = None,
     force: bool = False,
 ) -> Answer[str]:  # fmt: skip
     """Write a commented study file from a log, filled in with what could be recognised.
@@ -345,7 +363,7 @@ def init(
         find(plant)
     if record is None:
         record, _ = open_log(path, reader, time_unit)
-    text = draft(record, inspect(record), beside or path, study, plant=plant)
+    text = draft(record, inspect(record), beside or path, study, plant=plant or "")
     for key, value in (("reader", reader), ("time_unit", time_unit)):
         if value:
             text = text.replace("[defaults]\n", f'[defaults]\n{key} = "{value}"\n')
@@ -383,9 +401,9 @@ def init(
 )
 @keeps_its_inputs
 def law(
-    log: Log, *, command: str = "", measured: Sequence[str] | str = (), reference: Sequence[str] | str = (),
-    feedforward: Sequence[str] | str = (), every: int | None = None, out: str | os.PathLike[str] | None = None,
-    pdf: bool = False,
+    log: Log, *, command: str | None = None, measured: Sequence[str] | str | None = None,
+    reference: Sequence[str] | str | None = None, feedforward: Sequence[str] | str | None = None,
+    every: int | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Recovery]:  # fmt: skip
     """Recover the control law from a closed-loop log: structure, gains, limit, what is left.
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, cast, is_typeddict
 
 from upright.errors import BadInput, nearest
 from upright.verbs.command import parameter_texts
-from upright.verbs.values import si_if_given
+from upright.verbs.values import Start, si_if_given
 
 if TYPE_CHECKING:
     from upright.physics import Plant
@@ -78,11 +78,55 @@ class HoldingOptions(LoopOptions, TravelOptions, total=False):
     """All of these."""
 
 
-class DesignOptions(LoopOptions, total=False):
-    """What a design asks of a rig besides.
+class TrialOptions(HoldingOptions, total=False):
+    """The same, and how a pendulum is let go on how many rigs.
 
     Parameters
     ----------
+    start : str or mapping, optional
+        Of the pendulum when it is let go, from upright and outwards: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}``
+        [SI]; 5 degrees at rest, or what its rig model says, when omitted.
+    seconds : float, optional
+        Length of a run; 6 when omitted, 3 in a page.
+    draws : int, optional
+        Rigs drawn from the fit's covariance; 200 when omitted.
+    """
+
+    start: Start | None
+    seconds: float
+    draws: int
+
+
+class RunOptions(TypedDict, total=False):
+    """How a law runs on a rig.
+
+    Parameters
+    ----------
+    reference : str, optional
+        A signal as of `excite`, for the coordinate that the law's design tracks [rad or m].
+    mode : str, optional
+        ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
+    accept : str, optional
+        Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
+        not armed.
+    """
+
+    reference: str | None
+    mode: str | None
+    accept: str | None
+
+
+class DesignOptions(LoopOptions, total=False):
+    """What gains are to do, and what a design asks of a rig besides.
+
+    Parameters
+    ----------
+    effort_weight : float, optional
+        Weight of the effort; the limit decides when omitted.
+    track : str, optional
+        Coordinate that follows a reference.
+    sampled : bool, optional
+        Gains whose sampled loop has the requested poles.
     delay : float, optional
         How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
         matrices hold their own.
@@ -90,6 +134,9 @@ class DesignOptions(LoopOptions, total=False):
         Lag of the drive [s]; the fit's when omitted.
     """
 
+    effort_weight: float | None
+    track: str | None
+    sampled: bool | None
     delay: float | None
     lag: float | str | None
 

@@ -6,13 +6,14 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
 from upright.renamed import renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.options import RunOptions, known_options
 from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import Start, path_of, read_start
 
@@ -48,10 +49,10 @@ if TYPE_CHECKING:
 @renamed({"tilt": ("start", lambda value: value)})
 @keeps_its_inputs
 def run(
-    rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str = "", reference: str = "",
-    duration: float = 30.0, mode: str = "host", start: Start = "", check: bool = True, watch: bool = True,
-    accept: str = "", out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
-    observe: Callable[[RunState], str] = lambda _: "",
+    rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str | None = None,
+    duration: float = 30.0, start: Start | None = None, check: bool = True, watch: bool = True,
+    out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
+    observe: Callable[[RunState], str] = lambda _: "", **on: Unpack[RunOptions],
 ) -> Answer[RigRun]:  # fmt: skip
     """Run a law, or a signal, on a rig: supervised, watched, logged, judged.
 
@@ -68,12 +69,8 @@ def run(
     excite : str, optional
         Instead of a law, a signal put out blindly: ``"free"``, ``"step 0.5"``, ``"square 0.5 2"``, ``"sine 0.5 1.2"``,
         ``"sweep 0.5 0.5 10"`` [command unit, s, Hz].
-    reference : str, optional
-        The same, for the coordinate that the law's design tracks [rad or m].
     duration : float
         [s].
-    mode : str
-        ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
     start : str or mapping, optional
         Deviation of the last coordinate when the hand of a twin lets go, ``"5 deg"``; a number is [rad or m]. Under a
         law 3 degrees, or 3 mm, when omitted, so that there is something to see.
@@ -81,15 +78,14 @@ def run(
         Compare a small pulse with the model first.
     watch : bool
         Tell wrong encoders and a weak drive from hands and friction beside the loop.
-    accept : str, optional
-        Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
-        not armed.
     out : path
         Folder for the log and the page.
     pdf : bool
         Write the page as PDF too.
     observe : callable, optional
         Shown how it goes; answers with a sentence to end the run.
+    **on
+        Of the run: reference, mode, accept; see `RunOptions`.
 
     Returns
     -------
@@ -104,12 +100,12 @@ def run(
     from upright.running.chapter import run_chapter
     from upright.running.run import RunRequest, run_rig
 
-    folder = page_folder(out, pdf)
+    folder, on = page_folder(out, pdf), known_options(RunOptions, on, "run")
     leaning = _let_go(start, path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
-        excite=excite, reference=reference, seconds=duration,
-        mode=mode, tilt=leaning, check=check, watch=watch, accept=accept,
+        excite=excite or "", reference=on.get("reference") or "", seconds=duration, mode=on.get("mode") or "host",
+        tilt=leaning, check=check, watch=watch, accept=on.get("accept") or "",
     )  # fmt: skip
     result = run_rig(request, folder, watch=observe)
     written = run_chapter(result)
@@ -121,7 +117,7 @@ TAP = 3.0
 """Degrees, or millimetres, from which a twin starts under a law where nobody says, for something to be seen."""
 
 
-def _let_go(start: Start | float, rig: Path, *, law: bool) -> float:
+def _let_go(start: Start | float | None, rig: Path, *, law: bool) -> float:
     """Deviation of the last coordinate [SI], at rest and the others in the middle, as a hand lets go."""
     if isinstance(start, int | float):
         return float(start)

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     """A log: its file, a record, or a data frame."""
 
 
-def open_log(log: Log, reader: str = "", time_unit: str = "") -> tuple[Record, Path]:
+def open_log(log: Log, reader: str | None = None, time_unit: str | None = None) -> tuple[Record, Path]:
     """Record of a log and the path that it is called by; ``log`` for one that comes from no file.
 
     A `time_unit` is that of a time column which states none.
@@ -61,7 +61,7 @@ def open_log(log: Log, reader: str = "", time_unit: str = "") -> tuple[Record, P
         from upright.study.clock import with_time_unit
 
         path = Path(log)
-        return with_time_unit(read(path, reader=reader or None), time_unit), path
+        return with_time_unit(read(path, reader=reader), time_unit or ""), path
     from upright.records import Record
 
     if not isinstance(log, Record):

@@ -9,7 +9,7 @@ import pytest
 
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.lateness import lateness
+from upright.identification.inference.neglected import lateness
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend
 from upright.physics import find

@@ -337,7 +337,7 @@ def test_the_loop_is_judged_on_the_fastest_pole_with_its_digits() -> None:
 
 def test_a_drive_that_never_acted_is_named_with_the_pole() -> None:
     told = growing(10.0, 9.9, 10.1, 0.05, driven=False)
-    assert (told.answer, told.advice) == ("not tested", "Add a run in which it acts.")
+    assert (told.answer, told.advice) == ("not tested", "Add a run in which the drive acts, and identify again.")
     assert told.headline.startswith(
         "Inverted, the fastest pole is 10.000 1/s (9.9000 to 10.100); no fitted run was driven"
     )

@@ -55,7 +55,7 @@ def test_the_page_needs_nothing_from_anywhere(fit, written):
     links = [v for _, k, v in page.attributes if k in ("src", "href", "xlink:href", "data", "action")]
     assert all(v.startswith(("#", "data:image/")) for v in links)
     assert not re.search(r"@import|url\((?!#)", text)
-    assert not {"script", "link", "iframe", "object"} & set(page.tags)
+    assert not {"link", "iframe", "object"} & set(page.tags)
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_the_page_can_be_read_aloud(fit, written):
     _, page = written(fit)
     assert ("html", "lang", "en") in page.attributes
     assert page.tags.count("figure") == page.tags.count("figcaption") > 4
-    described = [v for tag, k, v in page.attributes if k == "aria-label"]
+    described = [v for tag, k, v in page.attributes if k == "aria-label" and tag == "div"]
     assert len(described) == page.tags.count("figure")
     assert all(described)
     assert page.tags.count("table") == page.tags.count("caption")
@@ -89,8 +89,8 @@ def test_names_from_a_log_cannot_become_markup(changed, written, swing):
     evil = '</text><script>alert("x")</script> $\\frac{1}{$ <b>'
     fit = changed(runs={evil: swing()}, verdict=evil, warnings=(evil,), unseen=(evil,), per_run={evil: {}})
     text, page = written(fit, title=evil, provenance={evil: evil})
-    assert "<script" not in text
-    assert "script" not in page.tags
+    assert text.count("<script") == text.count("</script>") == 3
+    assert page.tags.count("script") == 3  # the page's own, that of traces, and the samples of the run
     assert page.prose.count("<script>alert(") >= 5
 
 
@@ -139,7 +139,7 @@ def test_a_model_that_ran_away_is_drawn_all_the_same(changed, written, swing):
 
 def test_a_doubtful_fit_says_so_before_its_verdict(changed, written):
     _, page = written(changed(trusted=False, interrupted=True))
-    assert "Not to be trusted yet" in page.prose
+    assert "Do not rely on this model yet" in page.prose
     assert "interrupted" in page.prose
 
 

@@ -227,10 +227,11 @@ def test_poles_of_a_pair_stand_with_both_parts(changed):
     ("what", "said"),
     [
         ({"interrupted": True, "failed": True}, "search was interrupted"), ({"failed": True}, "The fit failed"),
-        ({"trusted": False}, "Not to be trusted yet."), ({}, "Trusted."),
+        ({"trusted": False}, "Do not rely on this model yet."),
+        ({}, "Rely on this model for prediction and for a loop."),
         ({"answers": (Judgement(question="Q", answer="not tested", headline="H"),)}, "Not tested: it explains"),
         ({"answers": (Judgement(question="Q", answer="yes", headline="H"),
-                      Judgement(question="Q", answer="not tested", headline="H"))}, "Trusted."),
+                      Judgement(question="Q", answer="not tested", headline="H"))}, "for prediction; its drive"),
     ],
 )  # fmt: skip
 def test_the_headline_says_the_worst_first(changed, what, said):
@@ -251,7 +252,7 @@ def part(fit, key, **more):
 def test_the_chapter_stands_on_what_the_fit_has(fit, changed):
     told = chapter(fit, provenance={"a": {"b": 1, "c": None, "d": ""}, "runs": ["x", "y"]})
     assert part(fit, "data").content == ("No origin was stated for these data.",)
-    assert told.parts[0].content[0].pairs == (("a / b", "1"), ("runs", "x; y"))
+    assert told.parts[-1].content[0].pairs == (("a / b", "1"), ("runs", "x; y"))
     assert part(fit, "how").content[0].sentences == (
         "simplex, then Levenberg-Marquardt; 321 evaluations in 1.23 s; final cost 0.456.",
     )

@@ -28,9 +28,9 @@ COLUMNS = {"psi": SEEN.columns[0], "theta": SEEN.columns[1]}
 
 @pytest.fixture
 def told(monkeypatch):
-    """What is said of a Furuta pendulum of two angles, when the accelerations are explained so."""
+    """What is taken instead of a Furuta pendulum of two angles, and said, when the accelerations are explained so."""
 
-    def sentence(shares: dict[str, float], columns=COLUMNS, plant: str = "furuta", **more) -> list[str]:
+    def sentence(shares: dict[str, float], columns=COLUMNS, plant: str = "furuta", **more) -> tuple[str, list[str]]:
         monkeypatch.setattr(module, "explained", lambda *_: dict(sorted(shares.items(), key=lambda item: -item[1])))
         monkeypatch.setattr(module, "draft", lambda *_, **__: "")
         monkeypatch.setattr(module, "plants_that_suit", lambda *_: ("furuta", "torsional-2", "double-pendulum"))
@@ -47,27 +47,37 @@ def told(monkeypatch):
         (0.5, 0.76, True), (0.5, 0.74, False), (0.99, 0.5, False),
     ],
 )  # fmt: skip
-def test_a_plant_is_far_better_that_leaves_half_of_more_than_a_tenth(told, own, best, better):
-    (said,) = told({"furuta": own, "torsional-2": best})
-    assert said.startswith(
-        f"Taken for furuta by its columns. Of the accelerations it explains {100 * own:.0f} %,"
-        f" torsional-2 {100 * best:.0f} %, double-pendulum was not tried: "
+def test_a_plant_that_leaves_half_of_more_than_a_tenth_is_taken_instead(told, own, best, better):
+    instead, (said,) = told({"furuta": own, "torsional-2": best})
+    theirs, ours = f"torsional-2 {100 * best:.0f} %", f"furuta {100 * own:.0f} %"
+    assert instead == ("torsional-2" if better else "")
+    assert said == (
+        f"Taken for torsional-2. Of the accelerations it explains {100 * best:.0f} %, {ours}, double-pendulum was not "
+        "tried: --plant says which."
+        if better
+        else f"Taken for furuta by its columns. Of the accelerations it explains {100 * own:.0f} %, {theirs}, "
+        "double-pendulum was not tried: --plant says which."
     )
-    assert said.endswith(
-        "--plant torsional-2 drafts what explains them far better." if better else "--plant says which."
-    )
+
+
+def test_columns_called_as_the_coordinates_are_believed_and_the_better_plant_is_named(told):
+    named = {name: replace(c, name=f"{name} [rad]") for name, c in COLUMNS.items()}
+    instead, (said,) = told({"furuta": 0.3, "torsional-2": 0.97}, named)
+    assert instead == ""
+    assert said.startswith("Taken for furuta by its columns. Of the accelerations it explains 30 %, torsional-2 97 %,")
+    assert said.endswith("--plant torsional-2 drafts what explains them far better.")
 
 
 def test_where_nothing_can_be_explained_the_columns_are_all_there_is(told):
     by_columns = ["Taken for furuta; the columns could be of torsional-2 or double-pendulum: --plant says which."]
-    assert told({}) == by_columns
-    assert told({"torsional-2": 0.9}) == by_columns
+    assert told({}) == ("", by_columns)
+    assert told({"torsional-2": 0.9}) == ("", by_columns)
     counted = {name: replace(c, guess="counts") for name, c in COLUMNS.items()}
-    assert told({"furuta": 0.9, "torsional-2": 0.95}, counted) == by_columns
-    assert told({"furuta": 0.9}, counted, plant="rectilinear-2") == []  # carts from disks they never tell
-    (only,) = told({}, doubts=("torsional-2 looks the same",))
+    assert told({"furuta": 0.9, "torsional-2": 0.95}, counted) == ("", by_columns)
+    assert told({"furuta": 0.9}, counted, plant="rectilinear-2") == ("", [])  # carts from disks they never tell
+    _, (only,) = told({}, doubts=("torsional-2 looks the same",))
     assert only == "Taken for furuta; the columns could be of double-pendulum: --plant says which."
-    assert told({}, doubts=("torsional-2 or double-pendulum",)) == []
+    assert told({}, doubts=("torsional-2 or double-pendulum",)) == ("", [])
 
 
 def test_plants_that_suit_have_as_many_coordinates_of_each_kind():

@@ -57,6 +57,19 @@ def test_what_a_log_alone_gives_can_be_used_and_the_rest_once_it_is_measured(tmp
         assert low <= TRUTH[name] <= high
 
 
+def test_nothing_is_usable_while_the_counts_of_a_turn_are_assumed(drafted):
+    """An encoder of 2400 counts that the draft takes for one of 4096: a swing of 1 rad looks like one of 0.6."""
+    log = swing()
+    counts = np.round(log["theta"].to_numpy() * 2400 / (2 * np.pi))
+    text, study = drafted("pendulum", t=log["t"].to_numpy(), theta_counts=counts)
+    assert "counts_per_rev = { value = 4096, assumed = true }" in text
+    assert study.model.assumed_scales == {"sensors.theta.counts_per_rev": 4096.0}
+    fit = identify(study.model, study.runs)
+    assert usable(fit) == set()
+    assert all("sensors.theta.counts_per_rev" in e.rests_on for e in fit.estimates.values())
+    assert "Move it by one full turn" in fit.verdict
+
+
 T = np.arange(4000) * DT
 W = 5.0
 ANGLE = np.clip(0.3 - 0.008 * T, 0, None) * np.cos(W * T)

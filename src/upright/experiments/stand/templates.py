@@ -8,7 +8,7 @@ from upright.files import replace_file
 from upright.study.text import toml
 
 RIG = """\
-# What the rig is, how it is reached and how far it may go: docs/rigs.md
+# What the rig is, how it is reached and how far it may go: docs/howto/rigs.md
 kind = "serial"
 port = {port}
 study = "study.toml"
@@ -24,9 +24,9 @@ lean = "25 deg"            # how far a pendulum may be from upright
 # start = "0.3 rad"
 """
 STUDY = """\
-# The rig as far as you know it: docs/study.md. A number is known, known about (with an uncertainty), or a guess to
-# start from. A response sees masses, frictions and the drive's gain only beside each other: weigh the pendulum and
-# find where it balances.
+# The rig as far as you know it; every key: docs/reference/study.md. A number is known, known about (with an
+# uncertainty), or a guess to start from. A response sees masses, frictions and the drive's gain only beside each
+# other: weigh the pendulum and find where it balances.
 [rig]
 plant = "furuta"           # or "cart-pendulum", "torsional-2", "rectilinear-2", "my_plant.py:MyRig"
 name = "my rig"

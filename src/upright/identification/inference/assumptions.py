@@ -40,12 +40,21 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
     """How every estimate would follow each assumed number, and its value without it.
 
     The optimum moves by ``d theta/d g = -(J'J)^-1 J'J_g`` when g does (implicit function theorem); nothing is fitted
-    again. Unless that is to be evaluated, or where the model runs away beside the optimum, nobody knows what follows.
+    again. Unless that is to be evaluated, or where the model runs away beside the optimum, nobody knows what follows;
+    nor what follows the scale of a column in counts.
     """
     problem, value = best.problem, best.values
     assumed = [p for p in problem.rig.parameters.values() if p.assumed]
+    unevaluated = {u.name: math.nan for u in problem.unknowns if u.shared and u.estimated}
+    scales = [
+        Assumption(
+            name=name, value=counts, unit="1" if name.endswith("rev") else "1/m", follows=unevaluated, without={},
+            size=counts, range=(counts / RANGE, counts * RANGE),
+        )
+        for name, counts in problem.rig.assumed_scales.items()
+    ]  # fmt: skip
     if not assumed:
-        return ()
+        return tuple(scales)
     places = [
         i for i, u in enumerate(problem.unknowns) if u.shared and u.estimated and not best.pinned[i] and value[i] != 0
     ]
@@ -63,6 +72,7 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
                 without=_without(p, follows, estimates, problem), range=_range(p, size),
             )
         )  # fmt: skip
+    out += scales
     return tuple(replace(a, ratios=_ratios(a, out, estimates)) for a in out)
 
 
@@ -223,7 +233,10 @@ def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
 
 def remedy(a: Assumption) -> str:
     """What frees the numbers that rest on an assumed one."""
-    key = a.name.rpartition(".")[2]
+    table, _, key = a.name.rpartition(".")
+    if table.startswith("sensors."):
+        one = "one full turn" if key == "counts_per_rev" else "one metre"
+        return f"Move it by {one}, see how much its column changes, and write that: {key} = ... under [{table}]."
     unit = "" if a.unit in ("", "1") else f" {a.unit}"
     table = "[actuator]" if a.name.startswith("actuator.") else "[parameters]"
     return f'Measure {a.name} and give it as known, {key} = "...{unit}" under {table}.'

@@ -48,6 +48,8 @@ def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
     by_equilibrium = poles(rig, values, names, C, best.quantile)
     growing = {at: max((p.real for p in there), key=lambda e: e.value) for at, there in by_equilibrium.items()}
     at = max(growing, key=lambda a: growing[a].value, default="")
+    if not names:  # every number that was to be estimated was left out
+        return None
     if not at or growing[at].value <= 0 or growing[at].interval[0] == growing[at].interval[1] == 0:
         return None
     growth = growing[at].value

@@ -1,15 +1,16 @@
-"""A constant force that the model leaves out: how large the runs say it is, and what it would change.
+"""What a model leaves out and the runs show: a constant force, a drive that acts late.
 
 A frame that is not level, an amplifier's offset, a cable that pulls: none of it is in most models, and the others then
-take its part, friction first, as well in this run as it can be done, and differently in the next. So it is asked for,
-as a considered parameter is whose effect the covariance of the estimates has to hold (Schmidt 1966; Tapley, Schutz and
-Born 2004, section 6.5): where the runs show it beyond two standard errors, every interval holds the estimate with it,
-and bands what it does to a prediction. On carts with flaws that their models lack it was there in 6 of 6, 2 to 6
-standard errors large, and moved dry friction by up to 1.5 half intervals.
+take its part, friction first, as well in this run as it can be done, and differently in the next. So it is a
+considered parameter (Schmidt 1966; Tapley, Schutz and Born, Statistical Orbit Determination, 2004, section 6.5), whose
+effect the covariance of the estimates has to hold: where the runs show it beyond two standard errors, every interval
+holds the estimate with it, and bands what it does to a prediction. On carts with flaws that their models lack it was
+there in 6 of 6, 2 to 6 standard errors large, and moved dry friction by up to 1.5 half intervals.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.intervals import Intervals, beside_bound, estimate
+from upright.identification.inference.scoring import score_run
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import NOISE, Parameter
@@ -27,6 +29,49 @@ from upright.identification.search.descent import descend
 
 Array = NDArray[np.float64]
 
+
+@dataclass(frozen=True, kw_only=True)
+class Considered:
+    """The optimum with the number, its last, and what share of the cost it leaves."""
+
+    optimum: Optimum
+    leaves: float
+
+
+def is_driven(best: Optimum) -> bool:
+    """Whether anything drives one of the fitted runs."""
+    return any(np.any(track.u) or track.run.loop is not None for track in best.problem.tracks)
+
+
+def consider(
+    best: Optimum, parameter: Parameter, *, share: float, tolerance: float, limit: int, farthest: float = math.inf
+) -> Considered | None:
+    """The optimum beside a number that is zero in the model.
+
+    None where it would take away less than a `share` of the cost to first order, or only beyond its bounds.
+    `farthest` is the largest value with which the fit begins.
+    """
+    problem = best.problem
+    (number,) = shared_unknowns(replace(problem.rig, parameters={parameter.name: parameter}))
+    rig = replace(problem.rig, parameters={**problem.rig.parameters, parameter.name: parameter})
+    wider = replace(problem, rig=rig, unknowns=[*problem.unknowns, number], steps=np.append(problem.steps, 1e-6))
+    z = np.append(best.x, 0.0)
+    here = wider.settle_steps(z)
+    free = np.append(~best.pinned, False)
+    aside = here.matrix[-1, free] @ pseudo_inverse(here.matrix[np.ix_(free, free)])
+    slope = float(here.gradient[-1] - aside @ here.gradient[free])
+    curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
+    if not curvature > 0 or not slope**2 > share * here.cost * curvature:
+        return None
+    z[-1] = np.clip(-slope / curvature, max(number.lower, -farthest), min(number.upper, farthest))
+    if z[-1] == 0:
+        return None
+    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=tolerance, limit=limit)
+    if end.interrupted:
+        raise KeyboardInterrupt
+    return Considered(optimum=assess(wider, end.x), leaves=end.normal.cost / here.cost)
+
+
 OFFSET = "actuator.offset"
 
 FELT = 0.05
@@ -34,9 +79,6 @@ FELT = 0.05
 
 SHOWN = 2.0
 """Standard errors from which on it counts as there: one right model in twenty then has intervals that are too wide."""
-
-FITTED = 8
-"""Evaluations for that fit, which begins where it is nearly done."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,30 +107,18 @@ class Neglected:
 
 def neglected(best: Optimum) -> Neglected | None:
     """The constant force that the runs show; None where it is asked for, or known, or not to be seen, or not there."""
-    problem, x = best.problem, best.x
+    problem = best.problem
     stated = problem.rig.parameters.get(OFFSET)
-    driven = any(np.any(track.u) or track.run.loop is not None for track in problem.tracks)
     own = any(t.ahead or "input_offset" in (*t.run.unknown, *t.run.shared) for t in problem.tracks)
-    if not driven or own or (stated is not None and (stated.estimate or stated.assumed or stated.value != 0)):
+    if not is_driven(best) or own or (stated is not None and (stated.estimate or stated.assumed or stated.value != 0)):
         return None
     limit = problem.rig.parameters.get("actuator.limit")
-    parameter = Parameter(name=OFFSET, value=0.0, unit="1" if limit is None else limit.unit, estimate=True)
-    (force,) = shared_unknowns(replace(problem.rig, parameters={OFFSET: parameter}))
-    rig = replace(problem.rig, parameters={**problem.rig.parameters, OFFSET: parameter})
-    wider = replace(problem, rig=rig, unknowns=[*problem.unknowns, force], steps=np.append(problem.steps, 1e-6))
-    z = np.append(x, 0.0)
-    here = wider.settle_steps(z)
-    free = np.append(~best.pinned, False)
-    aside = here.matrix[-1, free] @ pseudo_inverse(here.matrix[np.ix_(free, free)])
-    slope = float(here.gradient[-1] - aside @ here.gradient[free])
-    curvature = float(here.matrix[-1, -1] - aside @ here.matrix[free, -1])
-    if not curvature > 0 or not slope**2 > FELT * here.cost * curvature:
+    offset = Parameter(name=OFFSET, value=0.0, unit="1" if limit is None else limit.unit, estimate=True)
+    considered = consider(best, offset, share=FELT, tolerance=1e-4, limit=8)
+    if considered is None:
         return None
-    end = descend(wider.normal, z, wider.lower, wider.upper, tolerance=1e-4, limit=FITTED)
-    if end.interrupted:
-        raise KeyboardInterrupt
-    there = assess(wider, end.x)
-    size = estimate(there, x.size)
+    there = considered.optimum
+    size = estimate(there, best.x.size)
     if there.lost or not abs(size.value) > SHOWN * size.stderr:
         return None
     shared = [i for i in best.shared if not problem.unknowns[i].name.startswith(NOISE)]
@@ -107,3 +137,75 @@ def with_force(bands: Bands, force: Neglected) -> Bands:
     C[:-1, :-1] = bands.covariance
     C[-1, -1] = force.force.stderr**2
     return replace(bands, names=(*bands.names, OFFSET), covariance=C + np.outer(step, step))
+
+
+LATEST = 0.2
+"""Longest dead time [s] that is looked for."""
+
+PROMISED = 0.3
+"""Share of the cost that a dead time must take away to first order before it is fitted: fits then took away as much."""
+
+MENDED = 0.8
+"""Share of what was missed that may be missed with it."""
+
+NEAR = 0.02
+"""Longest dead time [s] that its fit begins with: a far one throws a swing out of phase."""
+
+DELAY, LAG = "actuator.delay", "actuator.lag"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lateness:
+    """A dead time of the drive that would explain what a fit misses: a `sentence` on it and on what it would cost.
+
+    With it the numbers that are `bent` lie outside the intervals that the fit without it tells.
+    """
+
+    sentence: str
+    bent: tuple[str, ...]
+
+
+def lateness(best: Optimum) -> Lateness | None:
+    """A dead time outside the model.
+
+    None where the drive's dead time or lag is estimated or known already, or nothing is driven.
+    """
+    problem, x = best.problem, best.x
+    stated = any(p.estimate or p.value for n, p in problem.rig.parameters.items() if n in (DELAY, LAG))
+    if stated or not is_driven(best):
+        return None
+    dead_time = Parameter(name=DELAY, value=0.0, unit="s", estimate=True, lower=0.0, upper=LATEST)
+    considered = consider(best, dead_time, share=PROMISED, tolerance=1e-6, limit=40, farthest=NEAR)
+    if considered is None or considered.leaves > MENDED**2:
+        return None
+    late = considered.optimum
+    if late.lost:
+        return None
+    delay, error = late.x[-1], late.quantile * late.sigma[-1]
+    if not 0 < error < delay:
+        return None
+    before, after = (
+        {
+            (track.run.label, s): p
+            for i, track in enumerate(of.tracks)
+            for s, p in score_run(of, i, at).fit_percent.items()
+        }
+        for of, at in ((problem, x), (late.problem, late.x))
+    )
+    run, signal = worst = min(before, key=lambda key: before[key])
+    half = best.quantile * best.sigma
+    bent = tuple(
+        u.name
+        for i, u in enumerate(problem.unknowns)
+        if u.shared and u.estimated and abs(late.x[i] - x[i]) > half[i] > 0
+    )
+    cost = f", and moves {', '.join(bent)} out of what the intervals say" if bent else ""
+    ms = [f"{1e3 * value:.3g}" for value in (delay, delay - error, delay + error)]
+    return Lateness(
+        sentence=f"The drive seems to act {ms[0]} ms late ({ms[1]} to {ms[2]}): with that dead time {signal} of run "
+        f"'{run}' would be explained to {after[worst]:.1f} % instead of {before[worst]:.1f} %. Ask for it, or for a "
+        f'lag, which does much the same: [actuator] delay = {{ guess = "{1e3 * delay:.2g} ms", max = "'
+        f'{1e3 * LATEST:.0f} ms" }}.'
+        f" It is one number more{cost}.",
+        bent=bent,
+    )

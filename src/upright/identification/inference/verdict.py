@@ -403,7 +403,7 @@ def _loop(evidence: Evidence, *, supported: bool) -> Judgement:
         return Judgement(
             question=LOOP, answer="not tested",
             headline=f"{where[0].upper()}{where[1:]}; no fitted run was driven, so what the drive does is not known.",
-            advice="Add a run in which it acts.",
+            advice="Add a run in which the drive acts, and identify again.",
         )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
     held = f"a loop with poles as fast as that stabilises {in_percent(s.share)} of the rigs within the intervals"

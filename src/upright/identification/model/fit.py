@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model.bands import Bands
 from upright.identification.model.grey_box import GreyBox
+from upright.physics import Plant
 
 Array = NDArray[np.float64]
 
@@ -173,6 +174,7 @@ class RunScore:
     ceiling: Mapping[float, Mapping[str, float]] = field(default_factory=dict[float, Mapping[str, float]])
     band: Mapping[str, Array] = field(default_factory=dict[str, Array])
     beyond: tuple[str, ...] = ()
+    guess: Array | None = None
 
     @property
     def inside(self) -> dict[str, float]:
@@ -224,6 +226,13 @@ class Fit:
     bands: Bands | None = None
     failed: bool = False
     proposed: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    @property
+    def plant(self) -> Plant:
+        """The plant with the numbers estimated and given."""
+        values = {n: p.value for n, p in self.model.parameters.items()}
+        values |= {n: e.value for n, e in self.estimates.items()}
+        return self.model.plant(**{n: v for n, v in values.items() if n in self.model.plant.names()})
 
     def keyed(self) -> dict[str, float]:
         """Every number found, by the key that problems know it by, see `Problem.key`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 
 from upright.errors import BadInput
 from upright.physics import Plant
@@ -39,13 +39,15 @@ class Parameter:
 class GreyBox:
     """A plant with the known and the estimated parameters of itself and its actuator.
 
-    The plant may be `guessed`: its columns suit it, and it was not specified.
+    The plant may be `guessed`: its columns suit it, and it was not specified. `assumed_scales` are counts per turn or
+    metre that nobody measured, by what a study calls them, of columns in counts.
     """
 
     plant: type[Plant]
     parameters: Mapping[str, Parameter]
     substeps: int = 1
     guessed: bool = False
+    assumed_scales: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def estimated(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from upright.errors import ImpossiblePhysics
 from upright.identification.inference.assumptions import assumption_sentences
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Fit, RunScore
@@ -21,8 +22,32 @@ from upright.report.fit.figures import (
     fit_figure,
     interval_figure,
 )
-from upright.report.fit.tables import cross_table, parameter_table, pole_table, ratio_table, run_table, score_table
-from upright.report.page import Block, Chapter, Facts, Formula, Part, Picture, Points, Step, Table
+from upright.report.fit.interactive import score_traces
+from upright.report.fit.tables import (
+    cross_table,
+    finding,
+    parameter_table,
+    pole_table,
+    ratio_table,
+    run_table,
+    score_table,
+)
+from upright.report.interactive.traces import ROOM
+from upright.report.page import (
+    Assessment,
+    Block,
+    Chapter,
+    Facts,
+    Formula,
+    KeyNumber,
+    Part,
+    Picture,
+    Points,
+    Step,
+    Symbol,
+    Table,
+)
+from upright.report.rig import rig_drawing
 from upright.report.symbols import percent, plain
 
 _HELD = (
@@ -57,40 +82,83 @@ def chapter(
         How much of each log counts, in sentences.
     """
     used = (Points(tuple(windows)),) if windows else ()
+    pictures = run_pictures(fit, "fit")
     return Chapter(
         title=title,
         verdict=headline(fit),
         detail=" ".join([*(a.headline for a in fit.answers), *assumption_sentences(fit.assumptions)]) or fit.verdict,
         sound=fit.trusted,
         question=question(fit),
+        assessments=tuple(
+            Assessment(question=a.question, state=_STATES[a.answer], why=a.headline) for a in fit.answers
+        ),
+        drawing=_drawing(fit),
+        best=_best(fit, pictures),
+        findings=tuple(_findings(fit)),
         parts=(
-            data_part(provenance or {}),
-            motion_part(fit),
-            Part(
-                title="Fit of the runs", key="fit", content=(*used, *_scores(fit, crossed), *run_pictures(fit, "fit"))
-            ),
             *_parameters(fit),
+            Part(title="Fit of the runs", key="fit", content=(*used, *_scores(fit, crossed), *pictures)),
+            *_verdict(fit),
             _residuals(fit),
             _unseen(fit),
-            *_verdict(fit),
+            motion_part(fit),
             *_search(fit),
+            data_part(provenance or {}),
         ),
         warnings=fit.warnings,
         steps=tuple(fit_steps(fit, study=study, folder=folder, crossed=crossed is not None)),
     )
 
 
+_STATES = {"yes": "supported", "in part": "in part", "no": "not supported"} | {
+    w: w for w in ("not tested", "not asked")
+}
+
+
+def _drawing(fit: Fit) -> Picture | None:
+    """The rig as estimated, where its numbers are those of a rig."""
+    if fit.failed:
+        return None
+    try:
+        return rig_drawing(fit.plant)
+    except ImpossiblePhysics:
+        return None
+
+
+def _best(fit: Fit, pictures: Sequence[Picture]) -> str:
+    """The run that tests the model, where one does: pictures begin with the fitted ones."""
+    fitted = sum(s.role == "fit" for s in fit.runs.values())
+    return pictures[fitted if fitted < len(pictures) else 0].name if pictures else ""
+
+
+def _findings(fit: Fit) -> Iterator[KeyNumber]:
+    """The pole that a loop has to master, then what was estimated, inertias and lengths before friction."""
+    poles = [p.real for p in fit.poles.get("inverted", ()) if p.real.value > 0]
+    if poles:
+        fastest = max(poles, key=lambda e: e.value)
+        yield finding("unstable pole", fastest, meaning="upright")
+    about = fit.model.parameters
+    estimates = [(n, e) for n, e in fit.estimates.items() if e.status not in ("known", "nuisance", "left out")]
+    for name, e in sorted(estimates, key=lambda item: item[0].startswith(("b_", "delta_", "v_"))):
+        yield finding(Symbol(name), e, meaning=about[name].meaning if name in about else "")
+
+
 def headline(fit: Fit) -> str:
     """The verdict in a sentence."""
     if fit.interrupted:
-        return "Not to be trusted yet: the search was interrupted, and this is its best so far."
+        return "Do not rely on this model yet: the search was interrupted, and this is its best so far."
     if fit.failed:
         return "The fit failed: the simulated motion grows beyond all bounds, so its numbers mean nothing."
     if not fit.trusted:
-        return "Not to be trusted yet."
-    if fit.answers and fit.answers[0].answer == "not tested":
+        return "Do not rely on this model yet."
+    answers = [a.answer for a in fit.answers]
+    loop = answers[-1] if len(answers) > 1 else "yes"
+    if answers[:1] == ["not tested"]:
         return "Not tested: it explains the runs that it was fitted to, and none was held out."
-    return "Trusted."
+    if loop == "yes":
+        return "Rely on this model for prediction and for a loop."
+    driven = {"not tested": "; its drive has not been tested", "no": ", not for a loop", "in part": ""}.get(loop, "")
+    return f"Rely on this model for prediction{driven}."
 
 
 def _verdict(fit: Fit) -> Iterator[Part]:
@@ -99,7 +167,7 @@ def _verdict(fit: Fit) -> Iterator[Part]:
         rows = tuple((a.question, a.answer, a.advice, " ".join(a.reasons)) for a in fit.answers)
         headings = ("question", "answer", "what to do", "why")
         table = Table(caption="What the fit is good for", headings=headings, rows=rows, badge=1)
-        yield Part(title="Verdict", key="verdict", content=(table,))
+        yield Part(title="What the verdict rests on", key="verdict", content=(table,), folded=True)
 
 
 def question(fit: Fit) -> str:
@@ -117,7 +185,7 @@ def question(fit: Fit) -> str:
 def data_part(provenance: Mapping[str, object]) -> Part:
     """Where the data came from."""
     origin: Block = Facts(tuple(_origin(provenance))) if provenance else "No origin was stated for these data."
-    return Part(title="Data", key="data", content=(origin,), aside=True)
+    return Part(title="Where the data come from", key="data", content=(origin,), aside=True)
 
 
 def _origin(provenance: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:
@@ -147,7 +215,10 @@ def motion_part(fit: Fit) -> Part:
         "are left out."
     )
     return Part(
-        title="Equations of motion", key="motion", content=(derived, Formula(markup=equations(plant, zero=zero)))
+        title="Equations of motion",
+        key="motion",
+        content=(derived, Formula(markup=equations(plant, zero=zero))),
+        folded=True,
     )
 
 
@@ -184,7 +255,10 @@ def score_pictures(scores: Mapping[str, RunScore], plant: type[Plant], prefix: s
             Picture(
                 name=f"{prefix}-run{i}",
                 draw=lambda score=score, title=title: fit_figure(score, plant, title=title, buckets=buckets),
-                caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin dashed line: model; "
+                interactive=lambda score=score, title=title: score_traces(
+                    {"model": score}, plant, name=title, room=ROOM // len(runs)
+                ),
+                caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin line: model; "
                 f"below each, their difference.{_banded(score)}",
                 description=f"Measured and modelled signals over {score.t[-1] - score.t[0]:.3g} s; fit {fits}.",
             )
@@ -209,19 +283,19 @@ def _parameters(fit: Fit) -> list[Part]:
         content = (Points(tuple(assumption_sentences(fit.assumptions))), *((ratios,) if ratios.rows else ()))
         parts.append(Part(title="What rests on assumed numbers", key="assumed", content=content))
     if own.rows:
-        parts.append(Part(title="Runs and groups", key="runs", content=(own,)))
+        parts.append(Part(title="Runs and groups", key="runs", content=(own,), folded=True))
     if poles.rows:
         about = (
             "Of the linear model at each equilibrium, viscous friction and back-EMF included, dry friction not; what "
             "the runs held is held."
         )
-        parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, poles)))
+        parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, poles), folded=True))
     return parts
 
 
 def _residuals(fit: Fit) -> Part:
     shown: tuple[Block, ...] = tuple(rest_picture(fit, "fit")) or ("There is no run to look at.",)
-    return Part(title="Residuals", key="residuals", content=shown)
+    return Part(title="Residuals", key="residuals", content=shown, folded=True)
 
 
 def rest_picture(fit: Fit, prefix: str) -> list[Picture]:
@@ -275,7 +349,7 @@ def _unseen(fit: Fit) -> Part:
                 description="; ".join(fit.unseen) or "No combination of the parameters is unseen.",
             )
         )
-    return Part(title="What the data cannot see", key="unseen", content=tuple(blocks))
+    return Part(title="What the data cannot see", key="unseen", content=tuple(blocks), folded=True)
 
 
 def _strongest(fit: Fit) -> str:
@@ -287,7 +361,7 @@ def _strongest(fit: Fit) -> str:
 def _search(fit: Fit) -> list[Part]:
     """How the numbers were found."""
     how = f"{fit.method}; {fit.evaluations} evaluations in {fit.seconds:.3g} s; final cost {fit.cost:.6g}."
-    parts = [Part(title="How the numbers were found", key="how", content=(Points((how,)),))]
+    parts = [Part(title="How the numbers were found", key="how", content=(Points((how,)),), folded=True)]
     if fit.history:
         stages = tuple((stage, f"{cost:.6g}", str(evaluations)) for stage, cost, evaluations in fit.history)
         table = Table(
@@ -313,6 +387,9 @@ def fit_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cross
             '[[runs]]\nhorizon = "0.5 s"',
         )
         return
+    loop = fit.answers[-1] if fit.answers else None
+    if loop and fit.trusted and loop.answer == "not tested" and loop.advice:
+        yield Step(loop.advice)
     yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder))
     untested = "Every run was fitted, so nothing tests the model yet; "
     if not (crossed or fit.interrupted) and all(s.role == "fit" for s in fit.runs.values()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from upright.report.page import KeyNumber, Symbol, Table
 from upright.report.symbols import number, percent, plain, unit, with_error
 
 _ESTIMATE = ("value", "std. error", "95 % interval", "unit", "status", "name and meaning")
+_SAME_POWER = re.compile(r"^(\S+?)(·10\S+) to (\S+)\2$")
 _OF_THE_RIG = "Parameters of the rig; standard errors allow for autocorrelated residuals"
 
 
@@ -122,12 +124,15 @@ def _called(name: str, about: Parameter | None) -> str:
     return f"{name}, {about.meaning}" if about and about.meaning else name
 
 
-def finding(what: str, e: Estimate, true: float | None = None) -> KeyNumber:
-    """An estimate for the cover."""
+def finding(what: str, e: Estimate, true: float | None = None, *, meaning: str | None = None) -> KeyNumber:
+    """An estimate for the first screen; with its unit where `meaning` says what it is, and not `what` with its unit."""
     d = figures(e.value, e.stderr)
     return KeyNumber(
-        what=what, value=number(e.value, d), interval=interval(e), truth="" if true is None else number(true, d)
-    )
+        what=what, value=number(e.value, d), unit="" if meaning is None else unit(e.unit),
+        interval=_SAME_POWER.sub(r"\1 to \3\2", interval(e)), truth="" if true is None else number(true, d),
+        meaning=meaning or "",
+        half=e.half if math.isfinite(e.half) else None,
+    )  # fmt: skip
 
 
 def plain_estimate(e: Estimate, true: float | None = None) -> dict[str, object]:

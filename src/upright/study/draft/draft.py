@@ -20,7 +20,7 @@ from upright.study.draft.chain_log import read_chain
 from upright.study.draft.compare import CLEAR, DOUBTFUL, LONGEST, explained
 from upright.study.draft.described import describe
 from upright.study.draft.pendulum import pendulum_tables
-from upright.study.draft.recognise import Recognised, recognise
+from upright.study.draft.recognise import Recognised, named_after, recognise
 from upright.study.draft.suits import COUNTED, plants_that_suit
 from upright.study.text import TomlTable, study_text
 from upright.study.windows import window_sentence
@@ -46,19 +46,15 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
         When nothing moves, or the clock cannot be in seconds.
     """
     check_clock(record)
-    recognised = recognise(record, inspection, plant)
-    file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
-    if recognised.plant.startswith(CHAINS):
-        where = "/".join(log.resolve().parts[-3:])
-        chain = read_chain(record, inspection, recognised, named=bool(plant), path=where)
-        recognised, tables = chain_tables(record, chain, file, log.stem)
-    else:
-        recognised, tables = pendulum_tables(record, inspection, recognised, file, log.stem)
-    describe(tables, record, inspection, recognised)
+    recognised, tables = _drafted(record, inspection, log, study, plant)
+    doubts = recognised.doubts
     if not plant:
+        better, sentences = alike(record, inspection, recognised)
+        if better:
+            recognised, tables = _drafted(record, inspection, log, study, better)
+        doubts = (*recognised.doubts, *sentences)
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
         rig.key("guessed", True, "the plant was not specified: take this out once you know it is this one")
-    doubts = [*recognised.doubts, *([] if plant else alike(record, inspection, recognised))]
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
@@ -71,17 +67,34 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
     return study_text([head, *tables])
 
 
+def _drafted(
+    record: Record, inspection: Inspection, log: Path, study: Path, plant: str
+) -> tuple[Recognised, list[TomlTable]]:
+    """What was recognised, as this plant or what the columns suggest, and the tables of its study."""
+    recognised = recognise(record, inspection, plant)
+    file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
+    if recognised.plant.startswith(CHAINS):
+        where = "/".join(log.resolve().parts[-3:])
+        chain = read_chain(record, inspection, recognised, named=bool(plant), path=where)
+        recognised, tables = chain_tables(record, chain, file, log.stem)
+    else:
+        recognised, tables = pendulum_tables(record, inspection, recognised, file, log.stem)
+    describe(tables, record, inspection, recognised)
+    return recognised, tables
+
+
 def window_of(tables: Sequence[TomlTable], record: Record) -> str:
     """How much of the record the runs of a draft are, in a sentence."""
     runs = [tomllib.loads(str(table))["runs"][0] for table in tables if table.lines[:1] == ["[[runs]]"]]
     return window_sentence([(r["role"], *r["window"]) for r in runs], float(record.t[0]), float(record.t[-1]))
 
 
-def alike(record: Record, inspection: Inspection, recognised: Recognised) -> list[str]:
-    """Sentence on the other plants that the columns could be of, and what each explains where it is known.
+def alike(record: Record, inspection: Inspection, recognised: Recognised) -> tuple[str, list[str]]:
+    """Plant to draft instead, and the sentence on all that the columns could be of with what each explains.
 
-    Counts of an unknown encoder do not tell: a pendulum's angle has to be an angle. Carts from disks they never tell,
-    and what was recognised says so already.
+    A plant that explains the accelerations far better is taken, unless the columns are called as the coordinates of the
+    one recognised. Counts of an unknown encoder do not tell: a pendulum's angle has to be an angle. Carts from disks
+    they never tell, and what was recognised says so already.
     """
     counted = any(c.guess in COUNTED for c in recognised.columns.values())
     others = [
@@ -90,11 +103,11 @@ def alike(record: Record, inspection: Inspection, recognised: Recognised) -> lis
         if n != recognised.plant and n not in " ".join(recognised.doubts)
     ]
     if not others or (counted and recognised.plant.startswith(CHAINS) and len(recognised.columns) > 1):
-        return []
+        return "", []
     head = f"Taken for {recognised.plant}"
     by_columns = [f"{head}; the columns could be of {' or '.join(others)}: --plant says which."]
     if counted:
-        return by_columns
+        return "", by_columns
     if record.t.size > LONGEST:
         first = min(int(np.searchsorted(record.t, recognised.window[0])), record.t.size - LONGEST)
         record = record.window(record.t[first], record.t[first + LONGEST - 1])
@@ -105,9 +118,13 @@ def alike(record: Record, inspection: Inspection, recognised: Recognised) -> lis
             drafts[name] = draft(record, inspection, log, log.with_suffix(".toml"), plant=name)
     shares = explained(record, drafts, log.name)
     if recognised.plant not in shares:
-        return by_columns
+        return "", by_columns
     own, best = shares[recognised.plant], next(iter(shares))
-    shares_text = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in others)
     better = own < 1 - DOUBTFUL and 1 - shares[best] < CLEAR * (1 - own)
-    remedy = f"--plant {best} drafts what explains them far better" if better else "--plant says which"
-    return [f"{head} by its columns. Of the accelerations it explains {100 * own:.0f} %, {shares_text}: {remedy}."]
+    named = named_after(list(recognised.columns.values())) == recognised.plant
+    taken, reason = (recognised.plant, " by its columns") if named or not better else (best, "")
+    rest = [n for n in (recognised.plant, *others) if n != taken]
+    shares_text = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in rest)
+    remedy = f"--plant {best} drafts what explains them far better" if better and named else "--plant says which"
+    sentence = f"Taken for {taken}{reason}. Of the accelerations it explains {100 * shares[taken]:.0f} %"
+    return "" if taken == recognised.plant else taken, [f"{sentence}, {shares_text}: {remedy}."]

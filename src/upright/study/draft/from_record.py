@@ -14,7 +14,10 @@ from upright.physics import Plant, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.readers import inspect
 from upright.records import Record
+from upright.rig import Rig
+from upright.rig.drive import GAIN
 from upright.study.draft.draft import draft
+from upright.study.draft.known_rig import state_rig
 from upright.study.load import Study, load_study
 from upright.study.text import toml
 
@@ -23,7 +26,7 @@ LOG = "log.csv"
 
 
 def study_of_record(
-    record: Record, plant: type[Plant] | None = None, *, known: Mapping[str, Number] | None = None,
+    record: Record, plant: type[Plant] | Rig | None = None, *, known: Mapping[str, Number] | None = None,
     ask: Sequence[str] | Mapping[str, Number] | None = None, columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None, window: tuple[float, float] | None = None,
 ) -> Study:  # fmt: skip
@@ -32,8 +35,8 @@ def study_of_record(
     Parameters
     ----------
     record : Record
-    plant : type of Plant, optional
-        Recognised from the columns when omitted.
+    plant : type of Plant or Rig, optional
+        Recognised from the columns when omitted; a rig's numbers count as `state_rig` says.
     known : mapping of name to number or text, optional
         Numbers that are given [SI], or as text with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
     ask : sequence of names, or mapping of name to guess, optional
@@ -51,11 +54,16 @@ def study_of_record(
         When a name fits neither the plant nor the record, or nothing can be recognised.
     """
     record = _renamed(record, columns or {}, units or {})
+    rig, plant = (plant, type(plant.plant)) if isinstance(plant, Rig) else (None, plant)
     name = name_of(plant) if plant is not None else ""
     study, plant = _drafted(record, name) if plant is None or name else (_plain(record, plant), plant)
     values = study.setdefault("parameters", {})
     _own_force(study, plant, weighs=ask is None)
-    _answer(values, study.setdefault("actuator", {}), plant, known or {}, ask)
+    given: dict[str, Number] = {}
+    if rig is not None:
+        state_rig(study, rig)
+        given = {**rig.plant.parameters(), **({GAIN: rig.gain} if "gain" in study["actuator"] else {})}
+    _answer(values, study.setdefault("actuator", {}), plant, known or {}, ask, given)
     if not study["actuator"]:
         del study["actuator"]
     if window is not None:
@@ -136,9 +144,9 @@ def _own_force(study: dict[str, Any], plant: type[Plant], *, weighs: bool) -> No
 
 def _answer(
     values: dict[str, Any], actuator: dict[str, Any], plant: type[Plant], known: Mapping[str, Number],
-    ask: Sequence[str] | Mapping[str, Number] | None,
+    ask: Sequence[str] | Mapping[str, Number] | None, given: Mapping[str, Number],
 ) -> None:  # fmt: skip
-    """Replace guesses of a draft by what is known and estimated."""
+    """Replace guesses of a draft by what is known and estimated; what is not estimated then is as a rig has it."""
     names = (*plant.names(), *ACTUATOR)
     estimated = [] if ask is None else list(ask)
     for name in (*known, *estimated):
@@ -155,10 +163,15 @@ def _answer(
     for name, value in known.items():
         where, key = table(name)
         where[key] = _text(value, plant, name)
-    starts = {n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or _guess(values, plant, n) for n in estimated}
+    starts = {
+        n: ask[n] if isinstance(ask, Mapping) else guesses.get(n) or given.get(n) or _guess(values, plant, n)
+        for n in estimated
+    }
     for name in guesses if ask is not None else ():
         where, key = table(name)
-        if name not in known:
+        if name in given:
+            where[key] = _text(given[name], plant, name)
+        elif name not in known:
             del where[key]
     for name, start in starts.items():
         where, key = table(name)

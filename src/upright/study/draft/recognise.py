@@ -22,6 +22,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_TURNS = re.compile(r"pend|angle|theta|pole|tilt", re.IGNORECASE)
 _SI = ANGLES | LENGTHS
 _COORDINATES = ("psi", "theta", "x")
 """Of the rigs that carry a pendulum."""
@@ -221,8 +222,7 @@ def drive_column(record: Record, inspection: Inspection) -> Column | None:
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
-    named = _by_coordinates({bare_name(c.name) for c in places})
-    if named:
+    if named := named_after(places):
         return named, f"The columns are called as the coordinates of a {named}."
     lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
@@ -242,6 +242,9 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
         )
     if lengths and angles:
         return "cart-pendulum", ""
+    turning = [c.name for c in counts if _TURNS.search(bare_name(c.name))]
+    if lengths and turning:
+        return "cart-pendulum", f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name."
     if len(angles) >= 2:
         if all(_DISK.search(bare_name(c.name)) for c in angles):
             return f"torsional-{min(len(angles), 3)}", "Several angles were taken for disks on a shaft."
@@ -252,12 +255,13 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     return "pendulum", doubt
 
 
-def _by_coordinates(names: set[str]) -> str:
-    """The only plant whose coordinates have just these names; empty where there is none.
+def named_after(places: list[Column]) -> str:
+    """The only plant whose coordinates have just the names of these columns; empty where there is none.
 
     Of our own only those that carry a pendulum: theta and alpha are arm and pendulum of Quanser's QUBE as well as hub
     and link of a flexible one.
     """
+    names = {bare_name(c.name) for c in places}
     fitting = [n for n, plant in PLANTS.sound().items() if {c.name for c in plant.coordinates} == names]
     own = len(names) > 1 and names <= set(_COORDINATES)
     return fitting[0] if len(fitting) == 1 and (own or fitting[0] not in PLANTS.own) else ""

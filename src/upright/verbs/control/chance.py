@@ -11,8 +11,8 @@ from upright.errors import BadInput
 from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.answer import Answer
-from upright.verbs.options import HoldingOptions, known_options, rig_entries
-from upright.verbs.values import Start, read_start
+from upright.verbs.options import TrialOptions, known_options, rig_entries
+from upright.verbs.values import read_start
 
 if TYPE_CHECKING:
     from upright.control.preflight import Preflight
@@ -26,8 +26,8 @@ UNSUPPORTED = (
 
 @renamed({**LET_GO, **CLUSTER})
 def chance(
-    fit: Any, gains: Any, *, start: Start = "", seconds: float = 6.0, draws: int = 200, seed: int = 0,
-    workers: Workforce = 1, progress: Progress = silent, **on: Unpack[HoldingOptions],
+    fit: Any, gains: Any, *, seed: int = 0, workers: Workforce = 1, progress: Progress = silent,
+    **on: Unpack[TrialOptions],
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
@@ -41,19 +41,15 @@ def chance(
     gains : Gains or array, shape (states,)
         On the states about the inverted equilibrium, commands in the unit of the fit's drive; see `design`, or
         multiply ``plant.linear("inverted").B`` by the gain of the drive.
-    start : str or mapping, optional
-        Where the pendulum is let go, and how fast: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}`` [SI]; 5 degrees
-        at rest, or the make's own, if left out.
-    seconds, seed
-        As in `regulate`.
-    draws : int
-        Rigs drawn.
+    seed : int
+        Of the rigs that are drawn.
     workers : int, str or executor
         Who simulates them, as in `regulate`.
     progress : callable, optional
         Called with how many are completed.
     **on
-        Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
+        Of the trial, start, seconds, draws; of the rig and its loop, limit, period, counts, vendor, travel, speed,
+        memory; see `TrialOptions`.
 
     Raises
     ------
@@ -73,7 +69,8 @@ def chance(
     from upright.verbs.handover import rig_of
     from upright.workers import Workers
 
-    on = known_options(HoldingOptions, on, "chance")
+    on = known_options(TrialOptions, on, "chance")
+    seconds, draws = on.get("seconds", 6.0), on.get("draws", 200)
     speed, memory = on.get("speed") or "filtered", on.get("memory", 0.5)
     if speed not in SPEEDS:
         raise BadInput(f"velocities come from {', '.join(SPEEDS)}, got '{speed}'.")
@@ -97,7 +94,7 @@ def chance(
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.resolution), K)
     let_go = dict(zip(("theta", "theta_dot"), usual, strict=True))
-    let_go |= read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
+    let_go |= read_start(on.get("start"), ("theta", "theta_dot"), ("rad", "rad/s"))
     task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)
     others = allowed(rig, draws, seed)
     predicted = preflight(

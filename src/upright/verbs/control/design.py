@@ -55,9 +55,9 @@ _poles = read_pole_list  # the verbs have options of this name
 )  # fmt: skip
 @keeps_its_inputs
 def design(
-    source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str = "",
-    poles: str | Iterable[complex] = "", lqr: str | Iterable[float] = "", effort_weight: float | None = None,
-    start: Start = "", track: str = "", sampled: bool = False, seed: int = 0,
+    source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str | None = None,
+    poles: str | Iterable[complex] | None = None, lqr: str | Iterable[float] | None = None,
+    start: Start | None = None, seed: int = 0,
     out: str | os.PathLike[str] | None = None, pdf: bool = False, **on: Unpack[DesignOptions],
 ) -> Answer[Designed]:  # fmt: skip
     """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
@@ -82,15 +82,9 @@ def design(
         neither these nor weights are given.
     lqr : str or sequence of float
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
-    effort_weight : float, optional
-        Weight of the effort; the limit decides when omitted.
     start : str or mapping, optional
         Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI]; a value alone is of
         the last coordinate.
-    track : str, optional
-        Coordinate that follows a reference.
-    sampled : bool
-        Gains whose sampled loop has the requested poles.
     seed : int
         Of the rigs drawn from the fit's covariance.
     out : path, optional
@@ -98,7 +92,8 @@ def design(
     pdf : bool
         Write the page as PDF too.
     **on
-        Of the rig and its loop: limit, period, counts, vendor, speed, memory, delay, lag; see `DesignOptions`.
+        Of the gains, effort_weight, track, sampled; of the rig and its loop, limit, period, counts, vendor, speed,
+        memory, delay, lag; see `DesignOptions`.
 
     Returns
     -------
@@ -124,8 +119,9 @@ def design(
     if (source is None) == (matrices is None):
         raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
     request = DesignRequest(
-        at="", poles=requested, weights=weights, R=effort_weight, delay=on.get("delay"),
-        lag=si_if_given(on.get("lag"), "s"), memory=on.get("memory", 0.5), track=track, sampled=sampled,
+        at="", poles=requested, weights=weights, R=on.get("effort_weight"), delay=on.get("delay"),
+        lag=si_if_given(on.get("lag"), "s"), memory=on.get("memory", 0.5), track=on.get("track") or "",
+        sampled=on.get("sampled") or False,
     )  # fmt: skip
     if matrices is not None or is_linear(source):
         if at or {"counts", "vendor"} & on.keys():
@@ -169,7 +165,7 @@ def design(
     return Answer(designed, page, files)
 
 
-def _pole_set(poles: str | Iterable[complex]) -> NDArray[np.complex128] | None:
+def _pole_set(poles: str | Iterable[complex] | None) -> NDArray[np.complex128] | None:
     """Poles that were asked for, those of a set of Table 1 by its name."""
     name = re.fullmatch(r"\s*set\s*(\w+)\s*", poles, re.IGNORECASE) if isinstance(poles, str) else None
     if name is None:
@@ -194,18 +190,18 @@ def _sampling(model: StateSpace, period: float | str | None) -> float:
     return model.dt or requested or 0.0
 
 
-def _numbers(text: str | Iterable[float]) -> tuple[float, ...] | None:
+def _numbers(text: str | Iterable[float] | None) -> tuple[float, ...] | None:
+    if text is None or text == "":
+        return None
     if not isinstance(text, str):
         return tuple(float(x) for x in text) or None
-    if not text:
-        return None
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
 
 
-def _start(rig: Rig | StateSpace, start: Start) -> tuple[float, ...]:
+def _start(rig: Rig | StateSpace, start: Start | None) -> tuple[float, ...]:
     """Deviation, state by state in its unit; empty when none was given."""
     states = read_start(start, rig.states, rig.state_units)
     if states and not any(states.values()):

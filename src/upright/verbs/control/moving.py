@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from upright.basis import NOT_SUPPORTED, Basis
 from upright.errors import BadInput, UprightError
 from upright.verbs.answer import Answer
-from upright.verbs.options import HoldingOptions, known_options, rig_entries
+from upright.verbs.options import TrialOptions, known_options, rig_entries
 from upright.verbs.values import Start, read_pole_list, read_start
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 
 def played(
-    known: Rig, *, poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 3.0, draws: int = 200,
-    seed: int = 0, out: str | os.PathLike[str] | None = None, **options: Any,
+    known: Rig, *, poles: str | Iterable[complex] | None = None, seed: int = 0,
+    out: str | os.PathLike[str] | None = None, **options: Any,
 ) -> Played:  # fmt: skip
     """A rig that moves in a page; arguments, result and errors as for `play`."""
     from upright.basis import SIMULATED
@@ -36,11 +36,12 @@ def played(
     path = None if out is None else Path(out)
     if path is not None and path.suffix != ".html":
         raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
+    on = known_options(TrialOptions, options, "play")
+    seconds, draws = on.get("seconds", 3.0), on.get("draws", 200)
     if not 0 < seconds <= 20:
         raise BadInput(f"rigs in a page run more than 0 and at most 20 s, got {seconds:g} s.")
     if not 1 <= draws <= 1000:
         raise BadInput(f"a page holds 1 to 1000 rigs, got {draws}.")
-    on = known_options(HoldingOptions, options, "play")
     if (on.get("speed") or "filtered") == "kalman":
         raise BadInput("in a page velocities come from plain or filtered differences; leave speed out.")
     if (lacks := unplayable(known)) is not None:
@@ -53,7 +54,7 @@ def played(
     )  # fmt: skip
     gains = (design_unasked if request.poles is None else design_for)(known, request).continuous
     text, scored = live_page(
-        known, rig, gains, start=start, seconds=seconds, draws=draws, seed=seed, speed=speed, memory=memory
+        known, rig, gains, start=on.get("start"), seconds=seconds, draws=draws, seed=seed, speed=speed, memory=memory
     )  # fmt: skip
     held = int(scored.held.sum())
     chapter = Chapter(
@@ -101,8 +102,8 @@ def unplayable(rig: Rig) -> str | None:
 
 
 def live_page(
-    known: Rig, rig: Rig, K: Array, *, start: Start = "", seconds: float = 3.0, draws: int = 200, seed: int = 0,
-    speed: str = "filtered", memory: float = 0.5,
+    known: Rig, rig: Rig, K: Array, *, start: Start | None = None, seconds: float = 3.0, draws: int = 200,
+    seed: int = 0, speed: str = "filtered", memory: float = 0.5,
 ) -> tuple[str, Scores]:  # fmt: skip
     """The page of a rig under gains K, and what becomes of the rigs that its fit allows; options as for `play`."""
     import numpy as np

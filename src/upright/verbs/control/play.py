@@ -10,8 +10,7 @@ from upright.files import keeps_its_inputs
 from upright.verbs.command import command
 from upright.verbs.control.moving import Played, played
 from upright.verbs.handover import rig_of
-from upright.verbs.options import HoldingOptions
-from upright.verbs.values import Start
+from upright.verbs.options import TrialOptions
 
 
 @command(
@@ -26,8 +25,8 @@ from upright.verbs.values import Start
 )
 @keeps_its_inputs
 def play(
-    fit: Any, *, poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 3.0, draws: int = 200,
-    seed: int = 0, out: str | os.PathLike[str] | None = None, **on: Unpack[HoldingOptions],
+    fit: Any, *, poles: str | Iterable[complex] | None = None, seed: int = 0,
+    out: str | os.PathLike[str] | None = None, **on: Unpack[TrialOptions],
 ) -> Played:  # fmt: skip
     """Make a page in which the identified rig moves: push it, drag its poles, see which rigs of the fit it holds.
 
@@ -40,19 +39,13 @@ def play(
         Of a rig with an inverted equilibrium and one drive.
     poles : str or sequence of complex
         Closed-loop poles to begin with [1/s]; proposed as by `design` when omitted.
-    start : str or mapping, optional
-        Where the pendulum is let go, and how fast: ``"12 deg"``, ``{"theta": 0.2}`` [SI]; 5 degrees at rest when
-        omitted.
-    seconds : float
-        How long the rigs of the fit run.
-    draws : int
-        How many they are.
     seed : int
-        Of their draw.
+        Of the rigs that are drawn.
     out : path, optional
         Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
     **on
-        Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
+        Of the trial, start, seconds, draws; of the rig and its loop, limit, period, counts, vendor, travel, speed,
+        memory; see `TrialOptions`.
 
     Returns
     -------
@@ -64,5 +57,5 @@ def play(
     BadInput
         When something of the rig is not known, or it cannot be drawn or compiled for a page.
     """
-    known = rig_of(fit, "play", seed=seed, draws=draws)
-    return played(known, poles=poles, start=start, seconds=seconds, draws=draws, seed=seed, out=out, **on)
+    known = rig_of(fit, "play", seed=seed, draws=on.get("draws", 200))
+    return played(known, poles=poles, seed=seed, out=out, **on)

@@ -14,9 +14,9 @@ from upright.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
-from upright.verbs.options import FIT, HoldingOptions, as_typed, known_options, rig_entries, vendor_of
+from upright.verbs.options import FIT, TrialOptions, as_typed, known_options, rig_entries, vendor_of
 from upright.verbs.pages import page_folder, write_page, written_where_named
-from upright.verbs.values import Start, read_pole_list, read_start
+from upright.verbs.values import read_pole_list, read_start
 
 if TYPE_CHECKING:
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
@@ -46,10 +46,9 @@ _poles = read_pole_list  # the verbs have options of this name
 @written_where_named
 @keeps_its_inputs
 def regulate(
-    source: Any = None, *, rig: str = "", seed: int | None = None, which: int | str = "",
-    poles: str | Iterable[complex] = "", start: Start = "", seconds: float = 6.0, draws: int = 200,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False, workers: Workforce = 1,
-    progress: Progress = silent, **on: Unpack[HoldingOptions],
+    source: Any = None, *, rig: str | None = None, seed: int | None = None, which: int | str | None = None,
+    poles: str | Iterable[complex] | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    workers: Workforce = 1, progress: Progress = silent, **on: Unpack[TrialOptions],
 ) -> Answer[Regulation]:  # fmt: skip
     """Hold an identified rig upright; say beforehand what each pole set will come to.
 
@@ -71,13 +70,6 @@ def regulate(
         Pole set of Table 1, 1 to 4, or all; the command line's ``--set``.
     poles : str or sequence of complex, optional
         Poles of one's own [1/s].
-    start : str or mapping, optional
-        Of the pendulum when it is let go, from upright and outwards: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}``
-        [SI].
-    seconds : float
-        Length of a run.
-    draws : int
-        Rigs that the fit's covariance allows, from which the chance is taken.
     out : path, optional
         Folder for all files; in Python none is written without one.
     pdf : bool
@@ -88,7 +80,8 @@ def regulate(
     progress : callable, optional
         Called with the current step and the share completed.
     **on
-        Of the rig and its loop: limit, period, counts, vendor, travel, speed, memory; see `HoldingOptions`.
+        Of the trial, start, seconds, draws; of the rig and its loop, limit, period, counts, vendor, travel, speed,
+        memory; see `TrialOptions`.
 
     Returns
     -------
@@ -111,8 +104,8 @@ def regulate(
     from upright.workers import Workers
 
     shared = Workers.of(workers)
-    at, on = page_folder(out, pdf), known_options(HoldingOptions, on, "regulate")
-    request = _request("" if which == "" else str(which), poles, on, start, seconds, draws)
+    at, on = page_folder(out, pdf), known_options(TrialOptions, on, "regulate")
+    request, draws = _request("" if which is None else str(which), poles, on), on.get("draws", 200)
     if source is None:
         make, seed = rig or "furuta", seed or 0
         progress("identifying the hanging twin", 0.0)
@@ -120,7 +113,7 @@ def regulate(
         name, base = f"--rig {make}", 0.6
     else:
         known, name, base = rig_of(source, "regulate", seed=seed or 0, draws=draws), called(source), 0.0
-        on["vendor"] = vendor_of(known, rig, on, name)
+        on["vendor"] = vendor_of(known, rig or "", on, name)
         name += as_typed(on)
     model = completed(
         known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="upright regulate"
@@ -146,7 +139,7 @@ def regulate(
 
 
 def _request(
-    which: str, poles: str | Iterable[complex], on: HoldingOptions, start: Start, seconds: float, draws: int,
+    which: str, poles: str | Iterable[complex] | None, on: TrialOptions
 ) -> RegulationRequest:  # fmt: skip
     from upright.experiments.regulation_2.run import SETS, RegulationRequest
     from upright.gains.requests import read_poles
@@ -157,9 +150,9 @@ def _request(
     if which not in ("", "all") and f"set {which}" not in SETS:
         raise BadInput(f"--set is 1 to {len(SETS)}, or all, got '{which}'.")
     printed = {n: read_poles(t) for n, t in SETS.items() if which in ("", "all", n[4:])}
-    let_go = read_start(start, ("theta", "theta_dot"), ("rad", "rad/s"))
+    let_go = read_start(on.get("start"), ("theta", "theta_dot"), ("rad", "rad/s"))
     return RegulationRequest(
         poles=printed if own is None else {"your poles": own}, speed=on.get("speed") or "filtered",
-        memory=on.get("memory", 0.5), seconds=seconds, draws=draws, tilt=let_go.get("theta"),
-        push=let_go.get("theta_dot"),
+        memory=on.get("memory", 0.5), seconds=on.get("seconds", 6.0), draws=on.get("draws", 200),
+        tilt=let_go.get("theta"), push=let_go.get("theta_dot"),
     )  # fmt: skip

@@ -45,7 +45,8 @@ if TYPE_CHECKING:
 @written_where_named
 @keeps_its_inputs
 def swing_up(
-    source: Any = None, *, rig: str = "", seed: int = 1, seconds: float = 12.0, lie: str | Mapping[str, float] = "",
+    source: Any = None, *, rig: str | None = None, seed: int = 1, seconds: float = 12.0,
+    lie: str | Mapping[str, float] | None = None,
     check: Log | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
     **on: Unpack[TravelOptions],
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
@@ -105,7 +106,7 @@ def swing_up(
         model, truth = make_rig(rig or "furuta"), make_rig(rig or "furuta", seed)
     else:
         identified = rig_of(source, "swing_up", seed=seed)
-        known, on["vendor"] = known_of(identified), vendor_of(identified, rig, on, called(source))
+        known, on["vendor"] = known_of(identified), vendor_of(identified, rig or "", on, called(source))
         entries = rig_entries(identified.plant, identified.unit, on)
         needs = ("limit", "servo_period", "counts", "travel")
         model = completed(identified, entries, vendor=on.get("vendor") or "", needs=needs, who="upright swing-up")
@@ -130,12 +131,12 @@ def swing_up(
     )
 
 
-def _faulty(rig: Rig, lie: str | Mapping[str, float]) -> Rig:
+def _faulty(rig: Rig, lie: str | Mapping[str, float] | None) -> Rig:
     """The rig with one encoder that shows a multiple of what is true."""
     if isinstance(lie, str):
         lies = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]
     else:
-        lies = [(name, str(value)) for name, value in lie.items()]
+        lies = [(name, str(value)) for name, value in (lie or {}).items()]
     names = [c.name for c in rig.plant.coordinates]
     factors = dict.fromkeys(names, 1.0)
     for name, value in lies:

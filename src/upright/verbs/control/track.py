@@ -44,7 +44,8 @@ _poles = read_pole_list  # the verbs have options of this name
 @keeps_its_inputs
 def track(
     source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
-    sets: str | int | Sequence[int] = "", poles: str | Iterable[complex] = "", step: float | str = "",
+    sets: str | int | Sequence[int] | None = None, poles: str | Iterable[complex] | None = None,
+    step: float | str | None = None,
     out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
     **on: Unpack[RigOptions],
 ) -> Answer[Tracking]:  # fmt: skip
@@ -127,7 +128,9 @@ def track(
     )
 
 
-def _sets(sets: str | int | Sequence[int]) -> tuple[int, ...]:
+def _sets(sets: str | int | Sequence[int] | None) -> tuple[int, ...]:
+    if sets is None:
+        return ()
     if isinstance(sets, int):
         return (sets,)
     if not isinstance(sets, str):

@@ -134,12 +134,10 @@ class FitAnswer(Answer["Fit"]):
 
     @property
     def plant(self) -> Plant:
-        """The plant with the numbers found and given."""
-        rig, estimates = self.value.model, self.value.estimates
-        values = {n: estimates[n].value if n in estimates else rig.parameters[n].value for n in rig.plant.names()}
-        return rig.plant(**values)
+        """The plant with the numbers estimated and given."""
+        return self.value.plant
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Data against the model for the first run, or the picture called `name`; see `pictures`."""
         if name:
             return super().plot(name)
@@ -202,7 +200,7 @@ class PredictedRuns:
 class Prediction(Answer[PredictedRuns]):
     """Scores of runs that a fit has not seen."""
 
-    def plot(self, name: str = "") -> Any:
+    def plot(self, name: str | None = None) -> Any:
         """Data against the prediction of the first run, or of the run called `name`."""
         from upright.report.fit.figures import fit_figure
 

@@ -83,9 +83,10 @@ class ResponseOptions(TypedDict, total=False):
 @written_where_named
 @keeps_its_inputs
 def frequency(
-    sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] = (), *, rig: str = "", seed: int = 0,
-    ask: str = "sines", data: str | os.PathLike[str] | None = None, out: str | os.PathLike[str] | None = None,
-    pdf: bool = False, progress: Progress = silent, **of_log: Unpack[ResponseOptions],
+    sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None = None, *, rig: str | None = None,
+    seed: int = 0, ask: str = "sines", data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+    **of_log: Unpack[ResponseOptions],
 ) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
     """Measure a frequency response, or read one from logs, and fit the rig to it.
 
@@ -138,10 +139,10 @@ def frequency(
         from upright.verbs.values import si_if_given
 
         request = LogRequest(
-            make=rig, command=options.get("command", ""), signals=pairs(options.get("signal"), "--signal"), kind=kind,
-            seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
+            make=rig or "", command=options.get("command", ""), signals=pairs(options.get("signal"), "--signal"),
+            kind=kind, seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
             counts={n: _count(n, v) for n, v in pairs(options.get("counts"), "--counts").items()},
-            known={n: _known(n, v, rig) for n, v in pairs(options.get("known"), "--known").items()},
+            known={n: _known(n, v, rig or "") for n, v in pairs(options.get("known"), "--known").items()},
         )  # fmt: skip
         result = response_of_logs(logs, request, at, data=None if data is None else Path(data))
         files += [at / "fit.json"] if result.answer else []

@@ -13,9 +13,11 @@ from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.command import Flag, command
 from upright.verbs.study import folder_beside, read_study
-from upright.verbs.values import open_log
+from upright.verbs.values import open_log, texts
 
 if TYPE_CHECKING:
+    from upright.physics import Plant
+    from upright.rig import Rig
     from upright.study.load import Study
     from upright.verbs.values import Workforce
 
@@ -30,6 +32,8 @@ class LogOptions(TypedDict, total=False):
 
     Parameters
     ----------
+    known : mapping, optional
+        Numbers that are given [SI], or with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
     ask : sequence of names, or mapping of name to guess, optional
         What to estimate, and nothing else; without it what the draft asks and `known` leaves.
     columns : mapping of coordinate (or drive) to column, optional
@@ -40,6 +44,7 @@ class LogOptions(TypedDict, total=False):
         Part to fit [s]; the rest is left out.
     """
 
+    known: Mapping[str, float | str] | None
     ask: Sequence[str] | Mapping[str, float | str] | None
     columns: Mapping[str, str] | None
     units: Mapping[str, str] | None
@@ -104,7 +109,7 @@ def _keys() -> str:
         [actuator]
         gain = { guess = "2 N/V" }
 
-    All keys: `upright identify --keys`, or docs/study.md.
+    All keys: `upright identify --keys`, or docs/reference/study.md.
     Writes OUT/fit.json and OUT/report.html (and OUT/report.pdf with --pdf).
     Ctrl-C keeps the best so far and writes it.
     --hold-out each predicts every run from a fit of the others as well; --workers
@@ -116,23 +121,22 @@ def _keys() -> str:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def identify(
-    study: Any, plant: Any = None, *, known: Mapping[str, float | str] | None = None,
-    data: str | Path | None = None, hold_out: Sequence[str] | str = (), method: str = "auto",
-    out: str | Path | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
-    progress: Progress = silent, **of_log: Unpack[LogOptions],
+    study: Any, plant: Any = None, *, data: str | Path | None = None, hold_out: Sequence[str] | str | None = None,
+    method: str = "auto", out: str | Path | None = None, report: bool = True, pdf: bool = False,
+    workers: Workforce = 1, progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> FitAnswer:  # fmt: skip
     """Fit a rig's parameters to its logs as a study file says; write estimates and report.
 
     Parameters
     ----------
     study : Record, DataFrame, path of a log or of a study (TOML), or Study
-    plant : class of a plant or its name, optional
-        For a log: ``up.Pendulum``, ``"furuta"``; recognised from the columns when omitted.
-    known : mapping, optional
-        For a log: numbers that are given [SI], or with unit and, perhaps, uncertainty: ``{"m_p": "223.5 g"}``.
+    plant : class of a plant or its name, Rig, FitAnswer or Plant, optional
+        For a log: ``up.Pendulum``, ``"furuta"``; recognised from the columns when omitted. Of a rig or a fit, numbers
+        that were given or measured are known, those that were identified or guessed are estimated from where they are,
+        and assumed ones stay so.
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
-    hold_out : sequence of str
+    hold_out : sequence of str, optional
         Runs to predict instead of fitting; "each": all in turn.
     method : str
         How to search: auto, simplex, least-squares.
@@ -148,7 +152,7 @@ def identify(
     progress : callable, optional
         Called with the current step and the share completed.
     **of_log
-        For a log: ask, columns, units, window; see `LogOptions`.
+        For a log: known, ask, columns, units, window; see `LogOptions`.
 
     Returns
     -------
@@ -174,9 +178,9 @@ def identify(
     if method not in METHODS:
         raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
     options = known_options(LogOptions, of_log, "identify")
-    requested = requested_study(study, plant, data=data, known=known, **options)
+    requested = requested_study(study, plant, verb="identify", data=data, **options)
     label = requested.path
-    held = [hold_out] if isinstance(hold_out, str) else list(hold_out)
+    held = list(texts(hold_out))
     each = "each" in held and all(run.label != "each" for run in requested.runs)
     requested = requested.hold_out(*(name for name in held if not (each and name == "each")))
     fitted = sum(run.role == "fit" for run in requested.runs)
@@ -184,8 +188,9 @@ def identify(
         raise BadInput(f"{label}: --hold-out each takes two runs to fit or more, got {fitted}; add a run or a window")
     if not requested.model.estimated:
         raise BadInput(
-            f'{label}: nothing to estimate; give one a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}, or score'
-            " the runs with a model fitted before: upright predict OUT/fit.json STUDY.toml"
+            f'{label}: nothing to estimate; give one a guess, such as J_p = {{ guess = "1e-3 kg m^2" }}'
+            f' or ask=["{requested.model.plant.names()[0]}"], or score the runs with a model fitted before: upright'
+            " predict OUT/fit.json STUDY.toml"
         )
     if not fitted:
         raise BadInput(f'{label}: every run has role = "predict"; at least one needs role = "fit"')
@@ -215,35 +220,55 @@ def identify(
     return FitAnswer(fit, page, written, requested, crossed)
 
 
-def requested_study(source: Any, plant: Any = None, *, data: str | Path | None = None, **options: Any) -> Study:
-    """The study that was handed in, or the one that a log and what is known of it make."""
-    from upright.physics import Plant, find
+def requested_study(
+    source: Any, plant: Any = None, *, verb: str, folder: Path | None = None, data: str | Path | None = None,
+    **options: Any,
+) -> Study:  # fmt: skip
+    """The study that was handed in, or the one that a log and what is known of its rig make."""
+    from upright.physics import Plant
     from upright.rig import Rig
     from upright.study.load import Study
 
     of_log = {name: value for name, value in options.items() if value is not None}
-    is_study = isinstance(source, Study) or (isinstance(source, str | Path) and _is_study(Path(source)))
-    if is_study:
+    source = source.study if isinstance(source, FitAnswer) else source
+    if isinstance(source, Study) or (isinstance(source, str | Path) and _is_study(Path(source))):
         if of_log or plant is not None:
             name = next(iter(of_log), "plant")
             raise BadInput(f"{name} belongs to a log; the study says it itself, so change it there.")
         if isinstance(source, Study):
             return source
-        return read_study(Path(source), Path(), None if data is None else Path(data))
-    if isinstance(plant, str):
-        plant = find(plant)
-    if isinstance(plant, Plant | Rig):
-        kind = type(plant.plant if isinstance(plant, Rig) else plant).__name__
-        raise BadInput(f"identify takes the class, up.{kind}, and what is known in known={{...}}.")
-    if plant is not None and not (isinstance(plant, type) and issubclass(plant, Plant)):
-        raise BadInput(f"identify takes a plant such as up.Pendulum, or its name, got {type(plant).__name__}.")
+        return read_study(Path(source), folder or Path(), None if data is None else Path(data))
     from upright.study.draft.from_record import study_of_record
 
     known: Any = options.get("known")
     if known is not None and not isinstance(known, Mapping):
         raise BadInput(f"known has numbers by name, such as {{'m_p': '223.5 g'}}, got {known!r:.40}.")
+    what = _what_moves(plant, verb)
+    if isinstance(source, Rig | Plant):
+        raise BadInput(f"a rig has no runs; {verb} takes a log of it first, then the rig: up.{verb}(log, rig).")
     log: Any = source
-    return study_of_record(open_log(log)[0], plant, **options)
+    return study_of_record(open_log(log)[0], what, **options)
+
+
+def _what_moves(plant: Any, verb: str) -> type[Plant] | Rig | None:
+    """The rig or the kind of plant that a log is of."""
+    from upright.physics import Plant, find
+    from upright.rig import Rig
+    from upright.study.stored_rig import rig_of_plant
+
+    if plant is None or isinstance(plant, Rig):
+        return plant
+    if isinstance(plant, str):
+        return find(plant)
+    if isinstance(plant, FitAnswer):
+        return plant.rig
+    if isinstance(plant, Plant):
+        return rig_of_plant(plant)
+    if not (isinstance(plant, type) and issubclass(plant, Plant)):
+        raise BadInput(
+            f"{verb} takes a plant such as up.Pendulum, its name, or a rig or fit, got {type(plant).__name__}."
+        )
+    return plant
 
 
 def _is_study(path: Path) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs
@@ -13,12 +13,13 @@ from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.model.identify import LogOptions, requested_study
+from upright.verbs.options import known_options
 from upright.verbs.pages import pdf_has_folder, write_page
-from upright.verbs.study import folder_beside, read_study
+from upright.verbs.study import folder_beside
 
 if TYPE_CHECKING:
     from upright.identification.ladder.growth import Ladder
-    from upright.study.load import Study
     from upright.verbs.values import Workforce
 
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
         "study": "Rig, runs and everything one might ask.",
         "out": "Folder for results; STUDY-ladder if left out.",
     },
+    hidden=("plant", "known", "ask", "columns", "units", "window"),
     prepare=lambda typed: {**typed, "out": typed["out"] or folder_beside(typed["study"], "ladder")},
     more="""
     Rungs of your own, in the study:
@@ -52,9 +54,9 @@ if TYPE_CHECKING:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def ladder(
-    study: str | os.PathLike[str] | Study, *, out: str | os.PathLike[str] | None = None,
+    study: Any, plant: Any = None, *, out: str | os.PathLike[str] | None = None,
     data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
-    progress: Progress = silent,
+    progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> Answer[Ladder]:  # fmt: skip
     """Grow a model only while it predicts better what it has not seen.
 
@@ -66,8 +68,10 @@ def ladder(
 
     Parameters
     ----------
-    study : path or Study
-        Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted.
+    study : path, Study, Record, DataFrame or FitAnswer
+        Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted; or a log.
+    plant : class of a plant or its name, Rig, FitAnswer or Plant, optional
+        For a log: what it is of, as `identify` takes it.
     out : path, optional
         Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.
     data : path, optional
@@ -81,6 +85,8 @@ def ladder(
         an executor of `concurrent.futures`.
     progress : callable, optional
         Called with the current step and the share completed.
+    **of_log
+        For a log: known, ask, columns, units, window; see `identify`.
 
     Returns
     -------
@@ -103,13 +109,13 @@ def ladder(
 
     shared = Workers.of(workers)
     pdf_has_folder(out, pdf)
-    if isinstance(study, str | os.PathLike):
-        study = Path(study)
-        at = folder_beside(study, "ladder") if out is None else Path(out)
-        requested = read_study(study, at, None if data is None else Path(data))
-    else:
-        requested, study = _study(study, "ladder"), study.path
-        at = folder_beside(study, "ladder") if out is None else Path(out)
+    options = known_options(LogOptions, of_log, "ladder")
+    folder = Path() if out is None else Path(out)
+    requested = requested_study(
+        study, plant, verb="ladder", folder=folder, data=None if data is None else Path(data), **options
+    )
+    study = requested.path
+    at = folder_beside(study, "ladder") if out is None else Path(out)
     if out is not None:
         for name in ("ladder.json", "study.toml", "ladder.html"):
             check_output(at / name)
@@ -136,11 +142,3 @@ def ladder(
     if out is not None and (report or pdf):
         files += write_page(page, at / "ladder.html", pdf)
     return Answer(climbed, replace(page, numbers=numbers), files)
-
-
-def _study(source: Any, verb: str) -> Study:
-    from upright.study.load import Study
-
-    if not isinstance(source, Study):
-        raise BadInput(f"{verb} takes a study: its file (TOML), or the .study of a fit, got {type(source).__name__}.")
-    return source

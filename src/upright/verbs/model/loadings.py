@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 )
 @keeps_its_inputs
 def loadings(
-    logs: Sequence[Log] | Log = (), *, added: Sequence[str] | str = (), signal: str = "", command: str = "",
-    tolerance: float | str = "0 %", free: bool = False, twin: str = "", seed: int = 0,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    logs: Sequence[Log] | Log | None = None, *, added: Sequence[str] | str | None = None, signal: str | None = None,
+    command: str | None = None,    tolerance: float | str = "0 %", free: bool = False, twin: str | None = None,
+    seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Loadings]:  # fmt: skip
     """Find stiffness and bare inertia from step responses with known added masses.
 
@@ -94,7 +94,7 @@ def loadings(
             )
         records = [(record, path.name) for record, path in map(open_log, named)]
         weighed, page = weigh_logs(
-            records, texts(added), signal=signal, command=command, tolerance=si(tolerance, "1"), free=free
+            records, texts(added), signal=signal or "", command=command or "", tolerance=si(tolerance, "1"), free=free
         )
     files = [] if at is None else write_page(page, at / "report.html", pdf)
     numbers = {**page.numbers, "report": str(files[0]) if files else ""}
@@ -110,8 +110,9 @@ def loadings(
 )
 @keeps_its_inputs
 def plan_inertias(
-    *, rig: str = "rectilinear", bare: float | str = "", error: float | str = "0.2 %", tolerance: float | str = "0.2 %",
-    runs: int = 10, levels: int = 3, radius: Sequence[float | str] | float | str = (), target: float | str = "",
+    *, rig: str = "rectilinear", bare: float | str | None = None, error: float | str = "0.2 %",
+    tolerance: float | str = "0.2 %", runs: int = 10, levels: int = 3,
+    radius: Sequence[float | str] | float | str | None = None, target: float | str | None = None,
     out: str | os.PathLike[str] | None = None,
 ) -> Answer[dict[int, tuple[Plan, Plan]]]:  # fmt: skip
     """Say which masses, where and how often, give the tightest stiffness for the fewest runs.
@@ -176,7 +177,7 @@ def plan_inertias(
         n: plan_loadings(choice, n, bare=m_0, error=e, tolerance=g, piece=piece, levels=levels)
         for n in range(levels, runs + 1)
     }
-    wanted = _share(target, "--target") if target != "" else None
+    wanted = None if target is None else _share(target, "--target")
     chosen = fewest_runs({n: p[0].k for n, p in plans.items()}, wanted)
     if out is not None:
         from upright.experiments.weighing_1a.figures import plan_figure

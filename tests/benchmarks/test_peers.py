@@ -1,0 +1,59 @@
+"""Are peers and upright given the same rig? A swing of small amplitude has a closed form that each can be held to."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+
+import numpy as np
+import pytest
+
+from benchmarks.peers import black_boxes, ours
+from benchmarks.peers.task import Samples, Task, fit_percent, study_text
+
+M_P, L_CG, G = 0.2, 0.25, 9.81
+J_P, B_2 = 2e-3, 4e-3
+J_A = J_P + M_P * L_CG**2
+DECAY = B_2 / (2 * J_A)
+OMEGA = math.sqrt(M_P * G * L_CG / J_A - DECAY**2)
+
+
+def swing(seconds: float) -> Samples:
+    """theta = 0.02 exp(-b_2 t/(2 J_A)) cos(omega t), sin(theta) = theta to 7e-5."""
+    t = np.arange(round(100 * seconds)) * 0.01
+    y = 0.02 * np.exp(-DECAY * t) * np.cos(OMEGA * t)
+    return Samples(t=t, u=np.zeros(t.size), y=y[:, None])
+
+
+TASK = Task(
+    name="swing", plant="pendulum", known={"m_p": M_P, "l_cg": L_CG, "g": G}, guesses={"J_p": 3e-3, "b_2": 2e-3},
+    fitted=swing(8.0), held_out={"longer": swing(12.0)},
+)  # fmt: skip
+
+
+def test_a_study_asks_what_the_task_asks():
+    study = tomllib.loads(study_text(TASK))
+    assert study["parameters"]["m_p"] == "0.2 kg"
+    assert {n for n, v in study["parameters"].items() if isinstance(v, dict)} == set(TASK.guesses)
+    assert [run.get("role") for run in study["runs"]] == [None, "predict"]
+
+
+def test_upright_finds_inertia_and_friction_of_a_small_swing():
+    said = ours.answer(TASK)
+    # a swing of 0.02 rad is slower than a linear one by 0.02^2/16 = 2.5e-5, J_A by twice that: J_p is 0.14 of J_A
+    assert said.values["J_p"] == pytest.approx(J_P, rel=1e-3)
+    assert said.values["b_2"] == pytest.approx(B_2, rel=1e-3)
+    assert fit_percent(TASK.held_out["longer"], said.predicted["longer"])[0] > 99.9
+
+
+def test_arx_continues_a_damped_sine(monkeypatch):
+    """Two past samples tell the next one exactly."""
+    monkeypatch.setattr(black_boxes, "DECIMATIONS", (1,))
+    said = black_boxes.arx(TASK)
+    assert fit_percent(TASK.held_out["longer"], said.predicted["longer"])[0] > 99.99
+
+
+def test_fit_percent_of_the_mean_is_zero():
+    run = swing(2.0)
+    assert fit_percent(run, run.y) == [100.0]
+    assert fit_percent(run, np.full_like(run.y, run.y.mean())) == [pytest.approx(0.0, abs=1e-9)]
