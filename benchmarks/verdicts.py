@@ -2,11 +2,13 @@
 
 Of each plant 40 rigs of `misfit` are fitted to the first two thirds of a record and predict its last third. One in four
 is asked too little (viscous friction alone, the truth four times as dry), one in four has a record of a second and a
-half. What came is a whole other record as long, under other commands (80 % of each signal are asked); each number,
-within its interval or a fifth of the truth where it was called usable, not within a twentieth where it was not; and the
-plant upright under the loop that the fit would place. Of real rigs with three fitted runs or more all but two are
-fitted, one is predicted, and the last is what came, where it moves no body that the others held. Asked: a wrong yes in
-at most 5 of 100 cases, a wrong no in at most 15.
+half. What came is a whole other record as long, under other commands (80 % of each signal are asked, where the exact
+motion without the noise would reach as much: where nothing moves no model can); each number, within its interval or a
+fifth of the truth where it was called usable, not within a twentieth where it was not; and the plant upright under the
+loop that the fit would place. Of real rigs with three fitted runs or more all but two are fitted, one is predicted, and
+the last is what came, where it moves no body that the others held. Asked: a wrong yes in at most 5 of 100 cases, a
+wrong no in at most 15. "In part" is neither: the model lacks what its runs show, or was not tested by what was held
+out, or its own bands allow more to be missed.
 """
 
 from __future__ import annotations
@@ -43,25 +45,31 @@ class Case:
     truth: dict[str, float]
     records: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list[tuple[np.ndarray, np.ndarray]])
     spoiled: str = ""
+    exact: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+SEED = 450_000
+"""Of the first rig. Rules were chosen on 50,000 and 150,000 and what follows these, never on rigs from here on."""
 
 
 def cases(make: Make, place: int, count: int) -> list[Case]:
-    """Flawed rigs with two records each."""
-    generators = [np.random.default_rng(50_000 + 1000 * place + k) for k in range(count)]
+    """Flawed rigs with two records each, `exact` what the second would be without noise."""
+    generators = [np.random.default_rng(SEED + 1000 * place + k) for k in range(count)]
     rigs = [drawn(make, g) for g in generators]
     found = [Case(make=make, truth=truth, spoiled=("", "too little asked", "", "short")[k % 4])
              for k, (truth, _) in enumerate(rigs)]  # fmt: skip
     for case in found:
         if case.spoiled == "too little asked":
             case.truth |= {n: DRY * v for n, v in case.truth.items() if n in DRY_NUMBERS}
-    flaws = Flaws(count, np.random.default_rng(100 + place))
+    flaws = Flaws(count, np.random.default_rng(SEED // 500 + place))
     other = [command(make.force, len(u), g) for (_, u), g in zip(rigs, generators, strict=True)]
     for again, inputs in ((False, [u for _, u in rigs]), (True, other)):
         start = {n: (0.7 if again else 1.0) * v for n, v in make.start.items()}
         u = np.stack([c[:, 0] for c in inputs], axis=1)
         motion = moved(replace(make, start=start), [case.truth for case in found], u, flaws)
         for k, (case, g) in enumerate(zip(found, generators, strict=True)):
-            y = sensed(make, read(make, motion[:, :, k], flaws, k), g.uniform(0, 0.95), 0.003, g)
+            case.exact = read(make, motion[:, :, k], flaws, k)
+            y = sensed(make, case.exact, g.uniform(0, 0.95), 0.003, g)
             case.records.append((inputs[k], y))
     return found
 
@@ -70,6 +78,7 @@ def answered(case: Case) -> Told:
     """What was said of one rig, and what came."""
     from upright.identification.estimate import identify, predict
     from upright.identification.inference.loop import driven_plant, placed
+    from upright.identification.inference.scoring import fit_percent
     from upright.identification.model.grey_box import base_values
 
     make = case.make
@@ -86,14 +95,15 @@ def answered(case: Case) -> Told:
     ])  # fmt: skip
     predicts, _, loop = fit.answers
     came = predict(fit, rig, [logged(make, "other", "predict", u2[:length], y2[:length])])["other"].fit_percent
-    told: Told = [(predicts.question, predicts.answer, min(came.values()) >= GOOD)]
+    exact = min(fit_percent(seen, true) for seen, true in zip(y2[:length].T, case.exact[:length].T, strict=True))
+    told: Told = [(predicts.question, predicts.answer, min(came.values()) >= GOOD)] if exact >= GOOD else []
     for n, e in fit.estimates.items():
         if e.status in ("well determined", "poorly determined", "at bound", "unseen"):
             usable = e.status == "well determined" and fit.trusted
             near = abs(e.value / case.truth[n] - 1)
             holds = e.interval[0] <= case.truth[n] <= e.interval[1] or near <= USEFUL
             told.append(("Can its numbers be used?", "yes" if usable else "no", holds if usable else near <= CLOSE))
-    if loop.answer != "not asked":
+    if "the fastest pole" in loop.headline:
         at = loop.headline.partition(",")[0].lower()
         values = base_values(rig) | {n: e.value for n, e in fit.estimates.items()}
         A, B = driven_plant(rig, values, at)

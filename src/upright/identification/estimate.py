@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -271,15 +271,15 @@ def _conclude(
     estimates = {n: estimates[n] for n in requested.parameters if n in estimates}
     if not brief:
         estimates = with_model_uncertainty(estimates, best, requested, left_out, log)
-    force = None if brief or little else neglected(best)
-    if force is not None:
+    forces = () if brief or little else neglected(best)
+    for force in forces:
         estimates |= {
             n: widened(estimates[n], i) for n, i in force.intervals.items() if estimates[n].status not in FIXED
         }
         warnings.append(force.sentence())
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
-    bands = bands if force is None or bands is None else with_force(bands, force)
+    bands = None if bands is None else reduce(with_force, forces, bands)
     ahead = None if best.lost else judged(problem, best.x)
     scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
     skipped = _skipped(runs, watch=watch) if end.interrupted else ()
@@ -306,6 +306,7 @@ def _conclude(
             interrupted=end.interrupted,
             memory=best.memory,
             bent=late.bent if late else (),
+            missing=tuple(force.sentence() for force in forces if force.essential),
             period=min(t.period for t in problem.tracks),
             standing=None if brief or identifiable.hidden else standing(best),
             judged=ahead,

@@ -213,6 +213,13 @@ class Step:
     command: str = ""
 
 
+PAPER = (
+    "B. T. Burchett, Four Hardware Experiments for Advanced Dynamics and Control, ASEE Annual Conference 2006, "
+    "paper 2006-1008."
+)
+"""Where the experiments are from, as a bibliography has it."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chapter:
     """Report of one log, fit, design or experiment.
@@ -362,10 +369,9 @@ class Book:
 
     @property
     def numbers(self) -> tuple[KeyNumber, ...]:
-        """Five for the first screen: of every chapter its first, then those with intervals."""
-        firsts = [c.findings[0] for c in self.chapters if c.findings]
-        others = [f for c in self.chapters for f in c.findings[1:] if f.interval]
-        return tuple([*firsts, *others][:5])
+        """Five for the first screen: of every chapter the first with an interval, then others of these."""
+        known = [[f for f in c.findings if f.interval] for c in self.chapters]
+        return tuple([*(of[0] for of in known if of), *(f for of in known for f in of[1:])][:5])
 
     @cached_property
     def cover(self) -> tuple[Part, ...]:

@@ -1,4 +1,4 @@
-"""A constant force that the model lacks is found, and intervals and bands hold what it changes."""
+"""A constant force or dry friction that the model lacks is found, and intervals and bands hold what it changes."""
 
 from __future__ import annotations
 
@@ -61,6 +61,43 @@ def test_no_force_is_told_where_none_is() -> None:
     fit = identify(rig(Furuta, FURUTA, GUESSES), [driven("one", "fit", 0.0, seed=3)])
     assert not any("constant force" in w for w in fit.warnings)
     assert OFFSET not in fit.bands.names  # type: ignore[union-attr]
+
+
+@pytest.fixture(scope="module")
+def frictionless():
+    """A fit to a rig with dry friction on its arm of a model that has viscous friction alone."""
+    guesses = {"J_d": 0.006, "b_1": 6e-3}
+    asked = rig(Furuta, {**FURUTA, "b_1c": 0.0}, guesses)
+    return identify(asked, [driven("one", "fit", 0.0), driven("two", "predict", 0.0, slow=0.5)])
+
+
+def test_dry_friction_that_nobody_asked_for_is_found_and_named(frictionless) -> None:
+    (said,) = [w for w in frictionless.warnings if "dry friction that the model leaves out" in w]
+    low, high = (float(word.strip("():")) for word in said.split("N m (")[1].split(")")[0].split(" to "))
+    assert low <= FURUTA["b_1c"] <= high
+    assert "[parameters] b_1c = { guess =" in said
+
+
+def test_a_model_that_lacks_dry_friction_predicts_in_part_however_well_it_explains(frictionless) -> None:
+    assert min(frictionless.runs["two"].fit_percent.values()) > 80
+    predicts = frictionless.answers[0]
+    assert predicts.answer == "in part"
+    assert "b_1c" in predicts.reasons[0]
+
+
+def test_viscous_friction_that_took_the_part_of_dry_friction_has_an_interval_that_holds_the_truth(frictionless) -> None:
+    b_1 = frictionless.estimates["b_1"]
+    assert b_1.value > 1.1 * FURUTA["b_1"]
+    assert b_1.interval[0] <= FURUTA["b_1"] <= b_1.interval[1]
+
+
+def test_no_dry_friction_is_told_where_it_is_asked_for_or_not_there(pulled) -> None:
+    assert not any("dry friction that" in w for w in pulled.warnings)
+    smooth = {**FURUTA, "b_1c": 0.0, "b_2c": 0.0}
+    x = simulate(Furuta(**smooth), {}, [0.0, 0.0, 0.5, 0.0], driven("a", "fit", 0.0).u, 4e-3, samples=1501, substeps=2)
+    run = noisy(replace(driven("a", "fit", 0.0), y=x[:, [0, 2], 0]), 1e-3, seed=4)
+    fit = identify(rig(Furuta, smooth, {"J_d": 0.006, "b_1": 6e-3}), [run])
+    assert not any("dry friction that" in w for w in fit.warnings)
 
 
 def test_a_log_of_another_day_has_its_friction_uncertain_unless_many_logs_were_fitted() -> None:

@@ -74,6 +74,45 @@ def test_a_prediction_is_bad_by_itself_or_beside_what_was_fitted() -> None:
     assert predicts(("a", score(theta=99.0)), ("b", score("predict", theta=80.1))).answer == "yes"
 
 
+def moving(role: str, size: float, missed: float, band: float = 1.0) -> RunScore:
+    """A square wave of so much standard deviation, met all over but for so much of it, with so wide a band."""
+    t = np.arange(40.0)
+    y = size * np.where(t % 2 < 1, 1.0, -1.0)[:, None]
+    whole = score(role, theta=100 * (1 - missed / size))
+    return replace(whole, t=t, y=y, simulated=y - missed, band={"theta": np.full(40, band)})
+
+
+@pytest.mark.parametrize(
+    ("size", "missed", "band", "said"),
+    [
+        (4.0, 1.9, 2.0, "in part"),  # 0.4 of the motion that was fitted, missed by 19 % of that
+        (4.0, 2.1, 2.2, "no"),  # by 21 %
+        (5.1, 1.9, 2.0, "no"),  # more than half as far
+        (4.0, 1.9, 1.8, "no"),  # nothing of it lies inside the band
+    ],
+)
+def test_what_hardly_moves_tests_nothing_where_it_is_missed_by_little(
+    size: float, missed: float, band: float, said: str
+) -> None:
+    told = predicts(("a", moving("fit", 10.0, 0.5)), ("b", moving("predict", size, missed, band)))
+    assert told.answer == said
+    assert any("Too little moved to test the model: b theta" in r for r in told.reasons) == (said == "in part")
+
+
+@pytest.mark.parametrize(("band", "said"), [(3.2, "yes"), (3.4, "in part")])
+def test_numbers_that_would_allow_a_fifth_to_be_missed_predict_in_part(band: float, said: str) -> None:
+    """A band of 90 % is 1.645 standard deviations wide: 3.29 of a signal of 10 lets 80 % be expected."""
+    told = predicts(("a", moving("fit", 10.0, 0.5)), ("b", moving("predict", 10.0, 0.5, band)))
+    assert told.answer == said
+
+
+def test_what_the_runs_show_and_the_model_lacks_is_said_first_and_leaves_it_in_part() -> None:
+    runs = ("a", score(theta=99.0)), ("b", score("predict", theta=98.0))
+    told = predicts(*runs, missing=("The runs show dry friction.",))
+    assert (told.answer, told.reasons[0]) == ("in part", "The runs show dry friction.")
+    assert predicts(*runs).answer == "yes"
+
+
 def test_of_several_horizons_that_one_decides_which_is_judged() -> None:
     near_and_far = replace(
         score("predict", theta=98.0), horizon=0.1, ahead={0.1: {"theta": 98.0}, 0.5: {"theta": 13.5, "psi": 2.0}}
@@ -400,7 +439,7 @@ def test_a_prediction_outside_its_bands_or_beyond_the_fit_is_told_as_such() -> N
     """Of 10 samples 3 lie inside, where 90 % should."""
     t, miss = np.arange(10.0), np.where(np.arange(10) < 3, 0.0, 1.0)
     seen = replace(
-        score("predict", theta=95.0), t=t, y=miss[:, None], simulated=np.zeros((10, 1)), measured=("theta",),
+        score("predict", theta=95.0), t=t, y=(20 * t + miss)[:, None], simulated=20 * t[:, None], measured=("theta",),
         band={"theta": np.full(10, 0.5)},
     )  # fmt: skip
     told = predicts(("a", score(theta=99.0)), ("b", seen))

@@ -26,7 +26,7 @@ from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Optimum, student
 from upright.identification.inference.loop import matrix_root
 from upright.identification.inference.reach import beyond, reached
-from upright.identification.model.bands import LEVEL, Bands, Spread
+from upright.identification.model.bands import LEVEL, NORMAL, Bands, Spread
 from upright.identification.model.fit import RunScore
 from upright.identification.model.grey_box import NOISE, GreyBox, Parameter
 from upright.identification.model.runs import LEAST_RUN, Run
@@ -41,8 +41,8 @@ Array = NDArray[np.float64]
 BLOCKS = 4
 """Blocks that the runs are cut into; fewer are longer, and more like a run of its own."""
 
-NORMAL, MOST = 1.645, 5.0
-"""Widths that hold 90 % of normal errors, and that no prediction is worth: such a block was lost, not missed."""
+MOST = 5.0
+"""Widths that no prediction is worth: such a block was lost, not missed."""
 
 FRICTION, GAIN = 0.13, 0.1
 """Standard deviations, relative, of friction and gain from log to log: friction of two runs of one day differed by

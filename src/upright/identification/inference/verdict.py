@@ -24,6 +24,13 @@ GOOD = 80.0
 DROP = 15.0
 """Percent by which a predicted signal may fall behind the worst fitted one of the same name."""
 
+STILL = 0.5
+"""A signal that moves at most this share of what it moves in a fitted run is missed by a share of that, not of its own
+motion: where nothing moves every model misses all of it."""
+
+MOSTLY = 50.0
+"""Percent of such a signal that has to lie inside its band: what is far outside was not lost among little motion."""
+
 MARGIN = 2.0
 """Percent by which a model has to beat held speeds for its horizon to tell anything; one step ahead fits anything."""
 
@@ -64,7 +71,8 @@ class Evidence:
     filter predicts, `driven` whether a command acted in a run.
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
-    more than they vary, `ties` which pairs of numbers cannot be separated.
+    more than they vary, `ties` which pairs of numbers cannot be separated, `missing` in sentences what the runs show
+    and the model lacks.
     """
 
     rig: GreyBox
@@ -84,6 +92,7 @@ class Evidence:
     lost: Sequence[str] = ()
     nothing: bool = False
     ties: Sequence[Tie] = ()
+    missing: Sequence[str] = ()
 
 
 def judge(evidence: Evidence) -> tuple[Judgement, ...]:
@@ -129,10 +138,11 @@ def _predicts(evidence: Evidence) -> Judgement:
     poor = [f"{what} {p:.1f} %" for what, p in fitted.items() if p < GOOD]
     if poor:
         against.append(f"The fitted runs are not explained ({', '.join(poor)}; {GOOD:.0f} % is the least).")
-    worse = _worse(evidence.runs)
+    still = _nearly_still(evidence.runs)
+    worse = [f"{what} {p:.1f} %" for what, p in _worse(evidence.runs).items() if what not in still]
     if worse:
         against.append(f"Runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)}).")
-    bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD]
+    bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD and what not in still]
     if bad and not worse:
         against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
     against += [s[0].upper() + s[1:] for s in evidence.conventions]
@@ -140,7 +150,8 @@ def _predicts(evidence: Evidence) -> Judgement:
     explains = f"It explains {_ranges(evidence.runs, 'fit')} of the fitted runs. " if fitted else ""
     if blank and len(blank) == sum(len(s.fit_percent) for s in evidence.runs.values()):
         against.append("No run is predicted far enough ahead to test the model.")
-    notes: list[str] = [] if evidence.judged is None else _horizon(evidence.judged, evidence.runs)
+    notes: list[str] = list(evidence.missing)
+    notes += [] if evidence.judged is None else _horizon(evidence.judged, evidence.runs)
     if blank:
         where = ", ".join(f"{label} {signal} at {evidence.runs[label].horizon:g} s" for label, signal in blank)
         notes.append(
@@ -171,7 +182,18 @@ def _predicts(evidence: Evidence) -> Judgement:
             f"Its 90 % bands were too narrow: they hold only {', '.join(narrow)} of the samples ({FEWEST:.0f} % is the "
             "least), so expect to be further off than the fit says."
         )
-    part = "in part" if blank or narrow else "yes"
+    vague = [f"{what} {p:.0f} %" for what, p in _expected(evidence.runs).items() if p < GOOD]
+    if vague and not still:
+        notes.append(
+            f"The numbers are so uncertain that no more can be expected of such runs ({', '.join(vague)}; {GOOD:.0f} % "
+            "is the least), however well these were met: fit longer ones, or with more in them."
+        )
+    if still:
+        notes.append(
+            f"Too little moved to test the model: {', '.join(still)} went at most {STILL:g} times as far as in the "
+            f"fitted runs, and was missed by less than {100 - GOOD:.0f} % of that. Hold a run out that moves more."
+        )
+    part = "in part" if blank or narrow or vague or still or evidence.missing else "yes"
     far = f" Outside what the fit has seen: {', '.join(outside)}." if outside else ""
     headline = (
         f"{explains}It predicts {_ranges(evidence.runs, 'predict')} of runs it has not seen{_beside(evidence.runs)}."
@@ -500,18 +522,41 @@ def _seconds(horizon: float) -> str:
     return f"{1e3 * horizon:.3g} ms" if horizon < 0.3 else f"{horizon:.3g} s"
 
 
-def _worse(runs: Mapping[str, RunScore]) -> list[str]:
-    """Predicted signals far behind the worst fitted one that was simulated as far ahead."""
+def _worse(runs: Mapping[str, RunScore]) -> dict[str, float]:
+    """Fit percents of predicted signals far behind the worst fitted one that was simulated as far ahead."""
     least: dict[tuple[str, float | None], float] = {}
     for s in runs.values():
         if s.role == "fit":
             for signal, percent in s.fit_percent.items():
                 key = signal, s.horizon
                 least[key] = min(percent, least.get(key, 100.0))
-    return [
-        f"{label} {signal} {percent:.1f} %"
+    return {
+        f"{label} {signal}": percent
         for label, s in runs.items()
         if s.role == "predict"
         for signal, percent in s.fit_percent.items()
         if percent < least.get((signal, s.horizon), GOOD) - DROP and percent < GOOD
-    ]
+    }
+
+
+def _nearly_still(runs: Mapping[str, RunScore]) -> list[str]:
+    """Predicted signals that move little beside the fitted ones, and are missed by little beside these."""
+    most: dict[str, float] = {}
+    for s in runs.values():
+        if s.role == "fit":
+            most |= {signal: max(moved, most.get(signal, 0.0)) for signal, moved in s.moved.items()}
+    out: list[str] = []
+    for label, s in runs.items():
+        for signal, percent in s.fit_percent.items() if s.role == "predict" else ():
+            share = s.moved.get(signal, 0.0) / most.get(signal, math.inf) if most.get(signal) else math.inf
+            small = share <= STILL and (100 - percent) * share <= 100 - GOOD
+            if percent < GOOD and small and s.inside.get(signal, 100.0) >= MOSTLY:
+                out.append(f"{label} {signal}")
+    return out
+
+
+def _expected(runs: Mapping[str, RunScore]) -> dict[str, float]:
+    """Fit percents that the bands of predicted signals lead to expect."""
+    return {
+        f"{label} {signal}": p for label, s in runs.items() if s.role == "predict" for signal, p in s.expected.items()
+    }

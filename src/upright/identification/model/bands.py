@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 LEVEL = 0.9
 """Share of unseen samples that should lie inside a band."""
 
+NORMAL = 1.645
+"""Standard deviations of normal errors that hold as many."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.bands import Bands
+from upright.identification.model.bands import NORMAL, Bands
 from upright.identification.model.grey_box import GreyBox
 from upright.physics import Plant
 
@@ -177,13 +177,30 @@ class RunScore:
     guess: Array | None = None
 
     @property
+    def scored(self) -> NDArray[np.bool_]:
+        """Which samples (N,) count."""
+        return self.t >= self.t[:1] + self.score_from - 1e-9
+
+    @property
+    def moved(self) -> dict[str, float]:
+        """Standard deviation of each signal, in its unit, where it moves at all."""
+        scored = self.y[self.scored]
+        return {
+            s: float(np.std(scored[:, k])) for k, s in enumerate(self.measured) if len(scored) and np.ptp(scored[:, k])
+        }
+
+    @property
     def inside(self) -> dict[str, float]:
         """Percent of the scored samples inside the band, by signal; empty without one."""
-        if not self.band:
-            return {}
-        scored = self.t >= self.t[0] + self.score_from - 1e-9
         missed = {s: np.abs(self.y[:, k] - self.simulated[:, k]) for k, s in enumerate(self.measured)}
-        return {s: 100 * float(np.mean((missed[s] <= half)[scored])) for s, half in self.band.items()}
+        return {s: 100 * float(np.mean((missed[s] <= half)[self.scored])) for s, half in self.band.items()}
+
+    @property
+    def expected(self) -> dict[str, float]:
+        """Fit percent that the band leads to expect, by signal that moves."""
+        moved = self.moved
+        widths = {s: float(np.sqrt(np.mean(half[self.scored] ** 2))) / NORMAL for s, half in self.band.items()}
+        return {s: 100 * (1 - width / moved[s]) for s, width in widths.items() if s in moved}
 
 
 @dataclass(frozen=True, kw_only=True)
