@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import upright as up
 from upright.control.exploration import exploration
-from upright.control.wiring import wiring
+from upright.control.wiring import check_wiring
 
 CART = up.CartPendulum(m_c=0.6, m_p=0.14, l_cg=0.19, J_p=6e-4, b_1=1.2, b_2=3e-5)
 GAIN, PERIOD, SECONDS = 5.25, 1e-3, 12.0
@@ -61,7 +61,9 @@ def counted(q: np.ndarray, *scales: float) -> np.ndarray:
 def test_what_is_turned_round_against_the_two_others_is_named(signs, named):
     t, q, u = moved()
     drive, x, theta = signs
-    found = wiring(RIG, t, counted(drive * q, x, theta), u)  # the mirrored motion is the one of the mirrored command
+    found = check_wiring(
+        RIG, t, counted(drive * q, x, theta), u
+    )  # the mirrored motion is the one of the mirrored command
     assert [what for what, _ in found.wrong] == ([named] if named else [])
 
 
@@ -69,7 +71,7 @@ def test_what_is_turned_round_against_the_two_others_is_named(signs, named):
 def test_counts_of_both_encoders_follow_from_gravity_and_the_period_of_large_swings(x, theta):
     t, q, u = moved()
     assert np.abs(q[:, 1]).max() > math.radians(50)  # what tells the scale of theta
-    found = wiring(RIG, t, counted(q, x, theta), u)
+    found = check_wiring(RIG, t, counted(q, x, theta), u)
     assert found.scale == pytest.approx((x, theta), rel=0.01)
     for value, error, true in zip(found.scale, found.error, (x, theta), strict=True):
         assert abs(value - true) < 4 * error
@@ -81,7 +83,7 @@ def test_counts_of_both_encoders_follow_from_gravity_and_the_period_of_large_swi
 @pytest.mark.parametrize("share", [1.0, 0.5])
 def test_gain_and_dead_zone_of_the_drive_follow_beside_each_other(dead_zone, share):
     t, q, u = moved(dead_zone, share * GAIN)
-    found = wiring(RIG, t, counted(q, 1.0, 1.0), u)
+    found = check_wiring(RIG, t, counted(q, 1.0, 1.0), u)
     assert abs(found.drive - share) < 4 * found.drive_error < 0.1
     assert abs(found.dead_zone - dead_zone) < 4 * found.dead_error < 0.06
     assert ("supply at half" in found.weak) == (share == 0.5)
@@ -89,15 +91,15 @@ def test_gain_and_dead_zone_of_the_drive_follow_beside_each_other(dead_zone, sha
 
 def test_a_late_drive_is_late_by_as_much():
     t, q, u = moved(late=0.012)
-    found = wiring(RIG, t, counted(q, 1.0, 1.0), u)
+    found = check_wiring(RIG, t, counted(q, 1.0, 1.0), u)
     assert found.delay == pytest.approx(0.012, abs=2 * PERIOD)
 
 
 def test_an_encoder_that_shows_nothing_is_named_instead_of_its_sign():
     t, q, u = moved()
-    assert wiring(RIG, t, counted(q, 1.0, 0.0), u).wrong[0][0] == "encoder of theta shows nothing"
-    assert wiring(RIG, t, counted(q, 0.0, 1.0), u).wrong[0][0] == "encoder of x shows nothing"
-    assert wiring(RIG, t, counted(q, 0.0, 0.0), u).wrong[0][0] == "nothing moves"
+    assert check_wiring(RIG, t, counted(q, 1.0, 0.0), u).wrong[0][0] == "encoder of theta shows nothing"
+    assert check_wiring(RIG, t, counted(q, 0.0, 1.0), u).wrong[0][0] == "encoder of x shows nothing"
+    assert check_wiring(RIG, t, counted(q, 0.0, 0.0), u).wrong[0][0] == "nothing moves"
 
 
 def test_the_exploration_asks_for_no_more_than_the_rig_may_be_given():

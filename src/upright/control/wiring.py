@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,7 +51,7 @@ USUAL = tuple(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wiring:
+class WiringCheck:
     """What the first motions tell.
 
     Attributes
@@ -144,7 +143,7 @@ class Wiring:
         return tuple(out)
 
 
-def wiring(model: Rig, t: ArrayLike, readings: ArrayLike, command: ArrayLike) -> Wiring:
+def check_wiring(model: Rig, t: ArrayLike, readings: ArrayLike, command: ArrayLike) -> WiringCheck:
     """How a rig is wired.
 
     Parameters
@@ -160,7 +159,7 @@ def wiring(model: Rig, t: ArrayLike, readings: ArrayLike, command: ArrayLike) ->
     """
     time, shown, u = (np.asarray(a, dtype=np.float64) for a in (t, readings, command))
     dt, units = float(time[-1] - time[0]) / (len(time) - 1), [c.unit for c in model.plant.coordinates]
-    known = Wiring(
+    known = WiringCheck(
         names=(model.plant.coordinates[0].name, model.plant.coordinates[1].name), unit=model.unit,
         said=(model.counts[0], model.counts[1]), turns=(units[0] == "rad", units[1] == "rad"),
         broke_away=_broke_away(model, shown[:, 0], u),
@@ -198,8 +197,6 @@ class _Motion:
 
 def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, float], float]:
     """Scales of both encoders with their errors, and the sign between them."""
-    from scipy.optimize import least_squares
-
     rho, spin = -b.kappa / b.weight, b.spin / b.J
     quiet = 0.02 * float(np.std(m.h1))
 
@@ -229,19 +226,21 @@ def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, floa
         rows = columns(math.exp(x[0]), abs(x[1] / x[2]))
         return np.asarray(rows[:, 0] - rows[:, 1:] @ x[1:], dtype=np.float64)
 
-    result = least_squares(residual, start, x_scale=np.maximum(np.abs(start), 1e-3))
-    x, J = result.x, np.asarray(result.jac)
-    spread = np.linalg.pinv(J.T @ J) * float(result.fun @ result.fun) / max(len(result.fun) - 5, 1) * 4.0
+    x, left, J = start, residual(start), np.zeros((0, 0))
+    steps = 1e-4 * np.maximum(np.abs(start), 1e-3)
+    for _ in range(6):  # Gauss and Newton's, from the best of the grid
+        J = np.column_stack([(residual(x + h) - left) / step for h, step in zip(np.diag(steps), steps, strict=True)])
+        x = x - np.linalg.lstsq(J, left, rcond=None)[0]
+        left = residual(x)
+    spread = np.linalg.pinv(J.T @ J) * float(left @ left) / max(len(left) - 5, 1) * 4.0
     c, s = math.exp(x[0]), abs(x[1] / x[2])
     to_s = np.array([0.0, 1 / x[1], -1 / x[2], 0.0, 0.0]) * s
     of_s = math.hypot(math.sqrt(max(to_s @ spread @ to_s, 0.0)), s * OF_RATIO)
     return (s, c), (of_s, c * math.sqrt(max(spread[0, 0], 0.0))), float(x[1] / x[2])
 
 
-def _of_drive(model: Rig, b: Body, found: Wiring, m: _Motion, u: Array, dt: float) -> Wiring:
+def _of_drive(model: Rig, b: Body, found: WiringCheck, m: _Motion, u: Array, dt: float) -> WiringCheck:
     """What the drive gives, by the row of the body: inertia, friction, gain and dead zone."""
-    from scipy.optimize import minimize_scalar
-
     s, c = found.scale[0], found.scale[1] * found.swings
     q1, q2, theta, w, w2 = m.p1 / s, m.p2 / s, m.h / c, m.h1 / c, m.h2 / c
     sine, cosine = np.sin(theta), np.cos(theta)
@@ -266,14 +265,12 @@ def _of_drive(model: Rig, b: Body, found: Wiring, m: _Motion, u: Array, dt: floa
         assert best is not None
         return best
 
-    delays = range(of(0.0)[1] + 1)  # what a dead zone hides of a drive does not make it faster
+    lost, delays = 0.0, range(of(0.0)[1] + 1)  # what a dead zone hides of a drive does not make it faster
     tried = np.linspace(0.0, 0.9 * float(np.abs(u).max()), 31)
-    costs = [of(lost)[0] for lost in tried.tolist()]
-    k = int(np.argmin(costs))
-    around = (float(tried[max(k - 1, 0)]), float(tried[min(k + 1, tried.size - 1)]))
-    best: Any = minimize_scalar(lambda v: of(v)[0], bounds=around, method="bounded", options={"xatol": 1e-4})
-    lost = float(best.x)
-    lost = 0.0 if costs[0] <= of(lost)[0] else lost
+    for _ in range(5):  # each time between the neighbours of the best
+        k = int(np.argmin([of(lost)[0] for lost in tried.tolist()]))
+        lost = float(tried[k])
+        tried = np.linspace(tried[max(k - 1, 0)], tried[min(k + 1, tried.size - 1)], 9)
     cost, late, x, rows = of(lost)
     edge = np.concatenate([np.zeros(late), -np.sign(u) * (np.abs(u) > lost)])[m.k : u.size - m.k]
     rows = np.column_stack([rows, x[-1] * m.smooth(edge)])

@@ -28,13 +28,13 @@ def chapter(result: QuickRun) -> Chapter:
     page = Chapter(
         key="quick", title=TITLE,
         question="Is the rig wired as it is described, and does it come upright and stay there?",
-        verdict=verdict(result), detail=_detail(result), sound=result.upright, parts=tuple(parts),
+        verdict=_verdict(result), detail=_detail(result), sound=result.upright, parts=tuple(parts),
         steps=_steps(result), findings=_findings(result), numbers=_numbers(result),
     )  # fmt: skip
     return resting_on(page, DESCRIBED if result.model is None else result.model.basis, result.stand.performed)
 
 
-def verdict(result: QuickRun) -> str:
+def _verdict(result: QuickRun) -> str:
     """What came of it, in a sentence or two."""
     weak = f" {_sentence(result.wiring.weak)}" if result.wiring.weak else ""
     if result.refused:
@@ -112,7 +112,7 @@ def _gains_part(result: QuickRun) -> Part:
     if result.ascent is not None:
         ascent = result.ascent
         picture = Picture(
-            name="ascent", draw=lambda: ascent_figure(ascent), description=verdict(result),
+            name="ascent", draw=lambda: ascent_figure(ascent), description=_verdict(result),
             caption="Angle, energy, command and driven body as logged. Shaded: the feedback holds.",
         )  # fmt: skip
         content = (*content, picture)
@@ -144,7 +144,7 @@ def _numbers(result: QuickRun) -> dict[str, Any]:
                        for n, e in result.fit.estimates.items()},
     }  # fmt: skip
     return {
-        "verdict": verdict(result), "upright": result.upright, "refused": result.refused,
+        "verdict": _verdict(result), "upright": result.upright, "refused": result.refused,
         "wrong": [what for what, _ in w.wrong], "weak": w.weak, "seconds": result.seconds, "wiring": vars(w),
         "fit": fit, "share": result.share, "K": None if law is None else law.K,
         "swing_up": None if a is None else {"upright_after": a.up, "peak_command": a.peak, "travel": a.travel,

@@ -13,7 +13,7 @@ from upright.control import SwingUp, design_swing_up
 from upright.control.exploration import CALMS, KICKS, PUMPS, SECONDS, exploration
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import SUBSTEPS
-from upright.control.wiring import Wiring, wiring
+from upright.control.wiring import WiringCheck, check_wiring
 from upright.experiments.stand.fits import fit_study
 from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import APPLIED, file_of
@@ -49,7 +49,7 @@ class QuickRun:
     stand : LiveStand
     log, mode : Record, array of shape (N,)
         Of the first motions, and what they were for (`control.exploration`).
-    wiring : Wiring
+    wiring : WiringCheck
     model : Rig or None
         As identified.
     study, fit : Study, Fit or None
@@ -68,7 +68,7 @@ class QuickRun:
     stand: LiveStand
     log: Record
     mode: Array
-    wiring: Wiring
+    wiring: WiringCheck
     seconds: float
     model: Rig | None = None
     study: Study | None = None
@@ -116,7 +116,7 @@ def run_quick(
     log = stand.explore(rule, SECONDS, folder, "explore")
     shown = np.column_stack([log[n] for n in stand.names])
     mode = rule.follow(shown, stand.rig.period)[1][:, 0]
-    found = wiring(stand.rig, log.t, shown - shown[0], log[APPLIED])
+    found = check_wiring(stand.rig, log.t, shown - shown[0], log[APPLIED])
     result = QuickRun(stand=stand, log=log, mode=mode, wiring=found, seconds=float(log.t[-1]))
     if not found.wrong and not np.any(mode == PUMPS):
         return replace(result, refused="the drive hardly moves it: look at its supply and its current limit")
