@@ -230,7 +230,7 @@ def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, floa
     steps = 1e-4 * np.maximum(np.abs(start), 1e-3)
     for _ in range(6):  # Gauss and Newton's, from the best of the grid
         J = np.column_stack([(residual(x + h) - left) / step for h, step in zip(np.diag(steps), steps, strict=True)])
-        x = x - np.linalg.lstsq(J, left, rcond=None)[0]
+        x = np.asarray(x - np.linalg.lstsq(J, left, rcond=None)[0], dtype=np.float64)
         left = residual(x)
     spread = np.linalg.pinv(J.T @ J) * float(left @ left) / max(len(left) - 5, 1) * 4.0
     c, s = math.exp(x[0]), abs(x[1] / x[2])
