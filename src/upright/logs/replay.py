@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 PATIENCE = (20.0, 2e-3)
 """Longest time that a logged rule may take, by itself and for each row [s]; a rule takes some 20 us for a row."""
 
+MEMORY = 4 << 30
+"""Most that it may take besides, where the system holds a process to that: not on Windows and macOS [bytes]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
@@ -160,7 +163,8 @@ def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> A
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", "from upright.logs.replay import answer; answer()"],
-            input=pickle.dumps((as_values(law), stretches, file)), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            input=pickle.dumps((MEMORY, as_values(law), stretches, file)),
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}, timeout=deadline, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -181,7 +185,11 @@ _COMMANDS, _REFUSED = b"=", b"!"
 
 def answer() -> None:
     """In the process of a logged rule: its commands, or why there are none, for what comes in."""
-    law, stretches, file = pickle.load(sys.stdin.buffer)
+    memory, law, stretches, file = pickle.load(sys.stdin.buffer)
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     try:
         content = _COMMANDS + _commands(of_values(law), stretches, file).tobytes()
     except BadInput as refusal:

@@ -13,7 +13,7 @@ from typing import Any
 from upright.errors import RigStopped, UprightError
 from upright.laws import Law, Rule, as_values
 from upright.logs import LogHeader, LogWriter
-from upright.realtime.interrupts import no_interrupt
+from upright.realtime.interrupts import ENDING, ignoring
 from upright.realtime.pace import Pace, Virtual
 from upright.rigs.board import SENTENCES, fault_text
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, Tick
@@ -219,12 +219,12 @@ def carry_out(
     except RigStopped as stop:
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
-        with no_interrupt():
+        with ignoring(ENDING):
             end["stopped"] = "Stopped by Ctrl-C or a signal."
             with suppress(RigStopped):
                 beside.give_up(Fault.STOP, end["stopped"])
     finally:
-        with no_interrupt():
+        with ignoring(ENDING):
             if not finished:
                 beside.rig.estop()
             beside.rig.close()
