@@ -51,7 +51,6 @@ class Replay:
         Commands that are not the logged ones to the last bit.
     largest : float
         Of their distances, in the command's unit.
-    first : Difference or None
     passed_over : int
         Rows in which the law commanded, behind rows that were dropped: what it remembered there is not known.
     """
@@ -80,7 +79,6 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
 
     Parameters
     ----------
-    log : RunLog
     law : Law or Rule, optional
         Instead of the logged one.
 

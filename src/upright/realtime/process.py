@@ -77,7 +77,6 @@ def run_in_process(
 
     Parameters
     ----------
-    order : RunOrder
     watch : callable
         Shown the state some twenty times a second; answers with a sentence when it wants the run to end.
     paced : bool

@@ -49,13 +49,10 @@ class RunOrder:
         Makes the stage, where the run will be.
     law : dict of str to any
         As `upright.laws.as_values` gives it.
-    seconds : float
-    mode : Mode
     check : bool
         Whether a pulse is given first.
     zero : bool
         Whether the rig is awaited to rest and zeroed first, instead of going on from where it was zeroed before.
-    log : Path
     rig_text : str
         Of the rig's file, for the log.
     references : tuple of (str, str)
@@ -118,7 +115,6 @@ class RunEnd:
         Of the loop.
     stopped : str
         Why it ended early, as a sentence; empty when it ran to its end.
-    faults : Fault
     about : Capabilities or None
         Capabilities that the rig reports; None when it did not answer.
     held : Limits or None
@@ -176,8 +172,6 @@ def carry_out(
 
     Parameters
     ----------
-    order : RunOrder
-    law : Law or Rule
     show : callable
         Called with the state at every tick; has to be quick.
     stopped : callable

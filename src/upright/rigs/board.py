@@ -76,12 +76,7 @@ def fault_text(faults: Fault) -> str:
 
 
 class Board:
-    """A `LiveRig` made of a port.
-
-    Parameters
-    ----------
-    port : Port
-    """
+    """A `LiveRig` made of a port."""
 
     def __init__(self, port: Port) -> None:
         self.port = port

@@ -23,8 +23,6 @@ class Connection:
     ----------
     kind, name : str
         As RIG.toml calls driver and rig; the name may be empty.
-    port : str
-    record : Path or None
     zero : str
         Equilibrium at which the encoders are zeroed.
     board : mapping of str to any

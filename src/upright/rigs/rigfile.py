@@ -113,7 +113,6 @@ class RigFile:
         ----------
         units : mapping of str to str
             ``"rad"`` or ``"m"`` by coordinate, in the plant's order.
-        command_unit : str
         default : Limits, optional
             For what the file leaves out; of hardware nothing is ever filled in.
 

@@ -92,8 +92,6 @@ class Supervisor:
 
     Attributes
     ----------
-    rig : LiveRig
-    duty : Duty
     event : callable
         Called with ``(time, kind, text)`` of each event.
     stopped : callable

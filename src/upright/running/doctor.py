@@ -71,7 +71,6 @@ def check_up(
 
     Parameters
     ----------
-    path : Path
     hand : callable, optional
         Called with a sentence that asks for something to be done, or with a question; answers whether it was done, or
         yes. A twin's own hand does it when omitted.

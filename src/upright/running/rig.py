@@ -98,7 +98,6 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
 
     Parameters
     ----------
-    path : Path
     balance : bool
         Whether an equilibrium is held that nothing holds by itself; else the rig stays where its encoders are zeroed.
     tilt : float
