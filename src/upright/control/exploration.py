@@ -38,7 +38,7 @@ WAITS, RISES, RESTS, FALLS, STOPS, KICKS, PUMPS, BRAKES, COASTS, CALMS, ENDS = r
 def explore(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
     """One sample, as a `laws.Rule`; everything in what the encoders show."""
     period, memory, slowly, moved, leant, bound, most, reach, calm, centre, swing, end = p
-    mode, since, q0, h0, v0, w0, seen, q1, h1, v, w, v_slow, w_slow, side, sign, level, gain, up, down, way, began = z
+    mode, since, q0, h0, v0, w0, marked, q1, h1, v, w, v_slow, w_slow, side, sign, level, gain, up, down, way, began = z
     q, h = y[0], y[1]
     v = memory * v + (1.0 - memory) * (q - q1) / period
     w = memory * w + (1.0 - memory) * (h - h1) / period
@@ -46,7 +46,7 @@ def explore(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
     u, a, lasted, before = 0.0, 0.0, t - since, mode
     ramp = min(most * (lasted / 4.0) * (lasted / 4.0) * (lasted / 4.0), most)
     # beyond where it goes without a push: a body without dry friction coasts on
-    further, lean = q - q0 - v0 * (t - seen), h - h0 - w0 * (t - seen)
+    further, lean = q - q0 - v0 * (t - marked), h - h0 - w0 * (t - marked)
     goes, leans = abs(further) > moved, abs(h) > 0.15
     if mode < 0.5:
         mode = 1.0 if lasted > 0.3 else mode
@@ -72,7 +72,7 @@ def explore(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
             gain = 2.0 * abs(further) / ((level - 0.8 * max(up, down)) * lasted * lasted)
             mode, level = 6.0, 1.0
         elif lasted > 0.4:
-            level, way, since, seen = min(2.0 * level, most), 0.0 - way, t, t - 1.0
+            level, way, since, marked = min(2.0 * level, most), 0.0 - way, t, t - 1.0
         if t - began > 4.0 and mode < 5.5:
             mode = 10.0
     elif mode < 6.5:
@@ -94,9 +94,9 @@ def explore(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
         u = side * (a / gain + 0.9 * max(up, down) * min(max(20.0 * a / reach, 0.0 - 1.0), 1.0))
         u = min(max(u, 0.0 - most), most)
     if mode != before:
-        since, seen = t, t - 1.0
-    if (mode < 4.5 and t - seen > 0.2) or t - seen > 0.9:
-        q0, h0, v0, w0, seen = q, h, v_slow, w_slow, t
+        since, marked = t, t - 1.0
+    if (mode < 4.5 and t - marked > 0.2) or t - marked > 0.9:
+        q0, h0, v0, w0, marked = q, h, v_slow, w_slow, t
     if t > end:
         mode, u = 10.0, 0.0
     return (u,), (
@@ -106,7 +106,7 @@ def explore(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
         h0,
         v0,
         w0,
-        seen,
+        marked,
         q,
         h,
         v,

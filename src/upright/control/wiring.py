@@ -12,7 +12,7 @@ to either side: ``force = gain sign(u) max(|u| - dead_zone, 0)``. All columns go
 linear relation as it is.
 
 Of drive, body and pendulum one is turned round against the two others, or none: all three turned round is the same rig
-seen in a mirror.
+shows in a mirror.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LONGEST = 0.04
 WEAK = 0.75
 """Share of the force described, below which a drive is called weak."""
 PLAIN = 20
-"""Counts without which nothing is said of an encoder."""
+"""Counts without which nothing is described of an encoder."""
 USUAL = tuple(
     sorted({lines * edges for edges in (1, 2, 4) for lines in (
         100, 200, 250, 256, 300, 360, 400, 500, 512, 600, 720, 1000, 1024, 1250, 1800, 2000, 2048, 2500, 3600, 4000,
@@ -60,7 +60,7 @@ class WiringCheck:
         Driven body and pendulum.
     unit : str
         Of the command.
-    said : tuple of float
+    described : tuple of float
         Counts per turn or metre, as described.
     turns : tuple of bool
         Whether they are per turn.
@@ -81,7 +81,7 @@ class WiringCheck:
 
     names: tuple[str, str]
     unit: str
-    said: tuple[float, float]
+    described: tuple[float, float]
     turns: tuple[bool, bool]
     moves: float = 0.0
     swings: float = 0.0
@@ -130,15 +130,17 @@ class WiringCheck:
     @property
     def _counted(self) -> tuple[tuple[str, str], ...]:
         out: list[tuple[str, str]] = []
-        rows = zip(self.names, self.said, self.turns, self.scale, self.error, strict=True)
-        for name, said, turns, scale, error in rows if self.moves and self.swings else ():
+        rows = zip(self.names, self.described, self.turns, self.scale, self.error, strict=True)
+        for name, described, turns, scale, error in rows if self.moves and self.swings else ():
             if abs(scale - 1.0) <= max(TOLERATED, SURE * error):
                 continue
-            counts = abs(said) * scale
-            usual = {round(abs(said) * edges) for edges in (0.25, 0.5, 2.0, 4.0)} | (set(USUAL) if turns else set())
+            counts = abs(described) * scale
+            usual = {round(abs(described) * edges) for edges in (0.25, 0.5, 2.0, 4.0)} | (
+                set(USUAL) if turns else set()
+            )
             near = sorted(n for n in usual if abs(n - counts) < counts * max(0.005, 2.5 * error / scale))
             likely = " or ".join(f"{n}" for n in near) if 0 < len(near) < 4 else f"{float(f'{counts:.3g}'):.0f}"
-            what = f"{name}: counts per {'turn' if turns else 'metre'} {likely}, not {abs(said):.0f}"
+            what = f"{name}: counts per {'turn' if turns else 'metre'} {likely}, not {abs(described):.0f}"
             out.append((what, f"it shows {scale:.3g} ± {2 * error:.1g} times what is true; correct its counts"))
         return tuple(out)
 
@@ -161,12 +163,12 @@ def check_wiring(model: Rig, t: ArrayLike, readings: ArrayLike, command: ArrayLi
     dt, units = float(time[-1] - time[0]) / (len(time) - 1), [c.unit for c in model.plant.coordinates]
     known = WiringCheck(
         names=(model.plant.coordinates[0].name, model.plant.coordinates[1].name), unit=model.unit,
-        said=(model.counts[0], model.counts[1]), turns=(units[0] == "rad", units[1] == "rad"),
+        described=(model.counts[0], model.counts[1]), turns=(units[0] == "rad", units[1] == "rad"),
         broke_away=_broke_away(model, shown[:, 0], u),
     )  # fmt: skip
-    seen = [bool(np.ptp(column) > PLAIN * step) for column, step in zip(shown.T, model.resolution, strict=True)]
-    if not all(seen):
-        return replace(known, moves=float(seen[0]), swings=float(seen[1]))
+    shows = [bool(np.ptp(column) > PLAIN * step) for column, step in zip(shown.T, model.resolution, strict=True)]
+    if not all(shows):
+        return replace(known, moves=float(shows[0]), swings=float(shows[1]))
     b, every = body(model), max(1, round(APART / dt))
     motion = _Motion(shown[:, 0], shown[:, 1], dt, every)
     scale, error, signed = _scales(b, motion)
@@ -239,9 +241,9 @@ def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, floa
     return (s, c), (of_s, c * math.sqrt(max(spread[0, 0], 0.0))), float(x[1] / x[2])
 
 
-def _of_drive(model: Rig, b: Body, found: WiringCheck, m: _Motion, u: Array, dt: float) -> WiringCheck:
+def _of_drive(model: Rig, b: Body, check: WiringCheck, m: _Motion, u: Array, dt: float) -> WiringCheck:
     """What the drive gives, by the row of the body: inertia, friction, gain and dead zone."""
-    s, c = found.scale[0], found.scale[1] * found.swings
+    s, c = check.scale[0], check.scale[1] * check.swings
     q1, q2, theta, w, w2 = m.p1 / s, m.p2 / s, m.h / c, m.h1 / c, m.h2 / c
     sine, cosine = np.sin(theta), np.cos(theta)
     # with the pendulum's share known, inertia and what a unit of command gives follow beside each other
@@ -277,7 +279,7 @@ def _of_drive(model: Rig, b: Body, found: WiringCheck, m: _Motion, u: Array, dt:
     spread = np.linalg.pinv(rows.T @ rows) * cost / max(len(rows) - x.size - 1, 1) * 4.0
     gain = float(x[-1])
     return replace(
-        found, moves=math.copysign(1.0, gain * model.gain), drive=abs(gain / model.gain), dead_zone=lost,
+        check, moves=math.copysign(1.0, gain * model.gain), drive=abs(gain / model.gain), dead_zone=lost,
         drive_error=math.hypot(math.sqrt(spread[3, 3]), OF_RATIO * gain) / abs(model.gain),
         dead_error=math.hypot(math.sqrt(spread[4, 4]), OF_LIMIT * model.limit), delay=late * dt,
     )  # fmt: skip

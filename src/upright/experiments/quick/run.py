@@ -11,6 +11,7 @@ import numpy as np
 
 from upright.control import SwingUp, design_swing_up
 from upright.control.exploration import CALMS, KICKS, PUMPS, SECONDS, exploration
+from upright.control.sensors import SURE
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import SUBSTEPS
 from upright.control.wiring import WiringCheck, check_wiring
@@ -116,13 +117,13 @@ def run_quick(
     log = stand.explore(rule, SECONDS, folder, "explore")
     shown = np.column_stack([log[n] for n in stand.names])
     mode = rule.follow(shown, stand.rig.period)[1][:, 0]
-    found = check_wiring(stand.rig, log.t, shown - shown[0], log[APPLIED])
-    result = QuickRun(stand=stand, log=log, mode=mode, wiring=found, seconds=float(log.t[-1]))
-    if not found.wrong and not np.any(mode == PUMPS):
+    check = check_wiring(stand.rig, log.t, shown - shown[0], log[APPLIED])
+    result = QuickRun(stand=stand, log=log, mode=mode, wiring=check, seconds=float(log.t[-1]))
+    if not check.wrong and not np.any(mode == PUMPS):
         return replace(result, refused="the drive hardly moves it: look at its supply and its current limit")
-    if found.wrong:
-        return replace(result, refused="; ".join(what for what, _ in found.wrong))
-    study, fit = fit_study(_study(stand, log, mode, folder), part(progress, 0.3, 0.8, "fitting the motion"))
+    if check.wrong:
+        return replace(result, refused="; ".join(what for what, _ in check.wrong))
+    study, fit = fit_study(_study(stand, log, mode, check, folder), part(progress, 0.3, 0.8, "fitting the motion"))
     if fit.interrupted or stopped():
         raise KeyboardInterrupt
     described = stand.described_by(folder / "fit.json", folder)
@@ -141,14 +142,20 @@ def run_quick(
     return replace(result, seconds=began + ended, ascent=ascent_of(run.trial, law, law_of_rig), ended=run.ended)
 
 
-def _study(stand: LiveStand, log: Record, mode: Array, folder: Path) -> Path:
-    """The study of the first motions: from the first kick on they are fitted, and calming is foreseen."""
+def _study(stand: LiveStand, log: Record, mode: Array, check: WiringCheck, folder: Path) -> Path:
+    """The study of the first motions: from the first kick on they are fitted, and calming is foreseen.
+
+    A dead zone that they show is estimated too.
+    """
+    more = {}
+    if check.dead_zone > SURE * check.dead_error:
+        more = {"dead_zone": {"guess": f"{check.dead_zone:.6g} {stand.rig.unit}", "min": 0}}
     t, kicks, calms = log.t, np.flatnonzero(mode >= KICKS), np.flatnonzero(mode >= CALMS)
     runs = [
         {"label": "first motions", "file": file_of(log), "window": [float(t[kicks[0]]), float(t[calms[0]])]},
         {"label": "calming", "file": file_of(log), "window": [float(t[calms[0]]), float(t[-1])], "role": "predict"},
     ]
-    return write_study(stand, folder / "study.toml", f"A minute at {stand.rig.name}", runs)
+    return write_study(stand, folder / "study.toml", f"A minute at {stand.rig.name}", runs, actuator=more)
 
 
 def caught(model: Rig, law: SwingUp, seed: int) -> float:
