@@ -12,7 +12,7 @@ to either side: ``force = gain sign(u) max(|u| - dead_zone, 0)``. All columns go
 linear relation as it is.
 
 Of drive, body and pendulum one is turned round against the two others, or none: all three turned round is the same rig
-shows in a mirror.
+seen in a mirror.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ LONGEST = 0.04
 WEAK = 0.75
 """Share of the force described, below which a drive is called weak."""
 PLAIN = 20
-"""Counts without which nothing is described of an encoder."""
+"""Counts without which an encoder shows nothing."""
 USUAL = tuple(
     sorted({lines * edges for edges in (1, 2, 4) for lines in (
         100, 200, 250, 256, 300, 360, 400, 500, 512, 600, 720, 1000, 1024, 1250, 1800, 2000, 2048, 2500, 3600, 4000,

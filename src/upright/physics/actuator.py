@@ -1,9 +1,13 @@
 """Numbers that every drive has besides the plant's own parameters, and the force it gives at measured speeds.
 
 ``force = clip(F_c(lag(delay(gain w / (1 + droop |w|)))) on(t) - slope v, force_limit) - B`` with
-``w = sign(c) max(|c| - dead_zone, 0)`` and ``c = clip(u, limit) + offset``: the drive is alive, ``on``, from `start` to `end`; F_c loses `fade` for each unit of
-speed beyond `knee`; and the braking ``B``, `damping` and `damping_rise` for each unit of command while the drive is
-alive and commanded and `standby` until it trips, times the speed, needs `relaxation` to build up and to fade.
+``w = sign(c) max(|c| - dead_zone, 0)`` and ``c = clip(u, limit) + offset``: the drive is alive, ``on``, from `start` to
+`end`; F_c loses `fade` for each unit of speed beyond `knee`; and the braking ``B``, `damping` and `damping_rise` for
+each unit of command while the drive is alive and commanded and `standby` until it trips, times the speed, needs
+`relaxation` to build up and to fade.
+
+An H-bridge is this with what it is already called: its dead zone; PWM steps, the `converter` of a rig; back-EMF, the
+`slope` (k_t k_e/R of a motor on voltage); a supply that sags under its own current, `droop`.
 """
 
 from __future__ import annotations

@@ -52,7 +52,8 @@ def write_study(
         written,
     ]
     if drive:
-        tables += [table("[actuator]", digits=10, **_late(stand, {**(actuator or {}), **tables_of_rig.get("actuator", {})})),
+        written_drive = {**(actuator or {}), **tables_of_rig.get("actuator", {})}
+        tables += [table("[actuator]", digits=10, **_late(stand, written_drive)),
                    table("[drive]", column=APPLIED, unit=stand.rig.unit)]  # fmt: skip
     for c, per in zip(stand.rig.plant.coordinates, stand.rig.per_unit, strict=True):
         counts = {"counts_per_rev": per * 2 * math.pi} if c.unit == "rad" else {"counts_per_m": per}

@@ -183,14 +183,8 @@ class Layout:
     @cached_property
     def settings(self) -> tuple[str, ...]:
         """Names of `rows` that stay as they are while a motion lasts: numbers of plant, drive and controller."""
-        drive = (
-            "gain",
-            "off",
-            "lim",
-            *["gd"] * self.flavour.droop,
-            *["dz"] * self.flavour.dead,
-            *["e", "ep", "th", "df"] * self.flavour.dynamic,
-        )
+        f = self.flavour
+        drive = ("gain", "off", "lim", *["gd"] * f.droop, *["dz"] * f.dead, *["e", "ep", "th", "df"] * f.dynamic)
         names = {f"{c}{j}" for c in drive for j in range(self.nu)} | {"di"} | set(self.constants)
         law = self.flavour.loop
         memory = {f"z{i}" for i in range(len(law.A))} if isinstance(law, Structure) else set[str]()

@@ -52,7 +52,10 @@ def start(w: Writer) -> None:
         if f.droop:
             w.add(f"{{gd{j}}} = P[{first + list(ACTUATOR).index('actuator.droop') * p.nu + j}, _m]")
         if f.dead:
-            w.add(f"{{dz{j}}} = P[{first + list(ACTUATOR).index('actuator.dead_zone') * p.nu + j}, _m]")
+            w.add(
+                f"{{dz{j}}} = P[{first + list(ACTUATOR).index('actuator.dead_zone') * p.nu + j}, _m]",
+                f"if not ({{dz{j}}} == {{dz{j}}}):", "    {q0} = nan",  # comparisons would let it pass unseen
+            )  # fmt: skip
         if f.dynamic:
             _actuator(w, j, first)
     law = first + len(ACTUATOR) * p.nu
