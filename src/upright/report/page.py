@@ -144,10 +144,13 @@ class Live:
     markup : str
         The page.
     description : str
+    short : bool
+        Whether half the height will do.
     """
 
     markup: str
     description: str
+    short: bool = False
 
 
 Block = str | Points | Facts | Code | Formula | Table | Picture | Live
