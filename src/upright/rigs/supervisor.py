@@ -42,8 +42,8 @@ PULSE = 0.15
 REST = 0.5
 """Time without a count after which a rig is at rest [s]."""
 
-UNSEEING = Fault.ENCODER | Fault.MODEL | Fault.STALE | Fault.LINK
-"""Faults after which the readings do not tell whether the rig still moves."""
+UNSEEING = Fault.ENCODER | Fault.MODEL | Fault.STALE | Fault.LINK | Fault.RESET
+"""Faults after which the readings do not tell whether the rig still moves; a board that starts anew counts anew."""
 
 Event = Callable[[float, str, str], None]
 

@@ -19,13 +19,13 @@ class Key(NamedTuple):
 
 
 _SENSOR = (
-    Key("column", '"theta"', "column of the log that measures this coordinate; the coordinate's own name if left out"),
+    Key("column", '"theta"', "column of the log that measures this coordinate; the coordinate's own name if omitted"),
     Key(
         "expression",
         '"theta_2 - theta_1"',
-        "sum of coordinates that the column measures, in the unit of this one; the coordinate itself if left out",
+        "sum of coordinates that the column measures, in the unit of this one; the coordinate itself if omitted",
     ),
-    Key("unit", '"counts"', "unit of the column (rad, deg, rev, m, mm, counts, ...); as the log states it if left out"),
+    Key("unit", '"counts"', "unit of the column (rad, deg, rev, m, mm, counts, ...); as the log states it if omitted"),
     Key("counts_per_rev", "14400", "encoder counts per turn: scale of a column in counts, else its resolution only"),
     Key("counts_per_m", "226629", "the same for a coordinate in m"),
     Key("scale", "1.02", 'factor; on a column of another kind SI per unit, as in "35 deg/V"'),
@@ -36,7 +36,7 @@ _SENSOR = (
 _DRIVE = (
     Key("column", '"v"', "column of the log that commands the actuator"),
     Key("expression", '"2.5*(0.2 - z)"', "or arithmetic on columns and the time t; see Expressions"),
-    Key("unit", '"V"', "unit of the command; read off the gain's unit if left out"),
+    Key("unit", '"V"', "unit of the command; read off the gain's unit if omitted"),
     Key("scale", "0.001", "factor on the command"),
     Key("sign", "-1", "+1 or -1: -1 when a positive command drives backwards, as the rig's laws then know"),
 )
@@ -46,7 +46,7 @@ _SHARED = (
     Key("drive", '"v", 0 or a table', "replaces [drive] for this run; 0 is a free run"),
     Key("inputs", "table", "replaces [inputs.NAME] for this run"),
     Key("sensors", "table", "changes keys of [sensors.COORDINATE] for this run"),
-    Key("measured", '["theta"]', "coordinates compared with the model; every sensor if left out"),
+    Key("measured", '["theta"]', "coordinates compared with the model; every sensor if omitted"),
     Key("locked", "{ x = 0.0 }", "coordinates that could not move, and where they were; a list of names means at zero"),
     Key("held", '["x"]', "coordinates moved from outside: their measured motion is prescribed"),
     Key("known", '{ a_1 = "0.5 kg" }', "parameters that differ in this run and are known"),
@@ -65,13 +65,13 @@ _SHARED = (
         "spread",
         "{ friction = 0.15 }",
         "by how much friction, gain or scale.COORDINATE may reasonably differ from 1 in this run, one sigma of the"
-        " logarithm; 0.3, 1 and 1 if left out",
+        " logarithm; 0.3, 1 and 1 if omitted",
     ),
     Key("initial", '{ theta = "1 rad" }', "states known at the first sample; these are not estimated"),
     Key(
         "horizon",
         '"0.5 s" or ["50 ms", "200 ms"]',
-        "predict this far ahead, again and again, from measured states; free run if left out. A list is explained "
+        "predict this far ahead, again and again, from measured states; free run if omitted. A list is explained "
         'together, from the states of a Kalman filter: restart = "kalman"',
     ),
     Key(
@@ -83,10 +83,10 @@ _SHARED = (
     Key("repeats", '"step 0.5 V"', "runs with the same label here repeat one another; the same command needs no label"),
     Key("score_from", '"30 s"', "seconds after the window's start before which nothing is scored"),
     Key("loop", "table", "law that closed the loop, simulated with the plant"),
-    Key("period", '"2 ms"', "sample period to resample to; the log's own if left out"),
+    Key("period", '"2 ms"', "sample period to resample to; the log's own if omitted"),
     Key("reader", '"table"', f"reader of the file ({', '.join(READERS.own)}), when it is not recognised"),
     Key("time", '"stamp"', "column that holds the time [s], when the reader took another one"),
-    Key("time_unit", '"ms"', "unit of the time column, when its name states none; seconds if left out"),
+    Key("time_unit", '"ms"', "unit of the time column, when its name states none; seconds if omitted"),
 )
 
 SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
@@ -103,7 +103,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("inputs", "table", "the same by name of the input, for plants with several"),
             Key("defaults", "table", "keys of [[runs]] that all runs share"),
             Key("runs", "list of tables", "stretches of data"),
-            Key("ladder", "list of tables", "rungs for `upright ladder`; friction, then drive, if left out"),
+            Key("ladder", "list of tables", "rungs for `upright ladder`; friction, then drive, if omitted"),
         ),
     ),
     "rig": (
@@ -116,7 +116,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
                 "the plant is a guess: its numbers count as one until a run that was not fitted is predicted",
             ),
             Key("substeps", "2", "integration steps per sample"),
-            Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if left out"),
+            Key("period", '"2 ms"', "sample period that all runs are resampled to; each log's own if omitted"),
             Key("name", '"bench 3"', "what its owner calls the rig; a fit that meets another rig says so"),
             Key(
                 "vendor",
@@ -161,11 +161,11 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
                 Key(
                     name.partition(".")[2],
                     '"2 N/V" or a table as above' if name.endswith("gain") else "value",
-                    f"{what.meaning}; {'none' if math.isinf(what.default) else f'{what.default:g}'} if left out",
+                    f"{what.meaning}; {'none' if math.isinf(what.default) else f'{what.default:g}'} if omitted",
                 )
                 for name, what in ACTUATOR.items()
             ),
-            Key("converter", '"0.3 mV"', "smallest step of the command, for simulations; not rounded if left out"),
+            Key("converter", '"0.3 mV"', "smallest step of the command, for simulations; not rounded if omitted"),
             Key("bits", "12", "of the converter instead of its step, together with"),
             Key("range", '"10 V"', "its largest command to either side: the step is 2 range/2^bits"),
         ),
@@ -175,7 +175,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
     "runs": (
         "[[runs]]",
         (
-            Key("label", '"kP 10"', "name in the report; the file's name if left out"),
+            Key("label", '"kP 10"', "name in the report; the file's name if omitted"),
             Key("file", '"logs/run_03.mat"', "log, relative to the study or to --data"),
             *_SHARED,
         ),
@@ -197,7 +197,7 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
         (
             Key("kind", '"pid"', '"state" (the default), "pid", "general", or "recover": found in the log itself'),
             Key("gains", '{ x = "2.5 V/m" }', "state: gain per state; u = drive + k_pf r - K (y - offset)"),
-            Key("k_pf", '"2.5 V/m"', "state: gain of the reference; the first gain if left out"),
+            Key("k_pf", '"2.5 V/m"', "state: gain of the reference; the first gain if omitted"),
             Key("alpha", "0.9", "state: pole of the differentiator's filter (0: plain difference)"),
             Key("measured", '"psi_1"', "coordinates the law reads, one or a list; the first one, or every sensor"),
             Key("reference", '"0.2 m", a column or an expression', "what the loop follows, in SI; a list for several"),
@@ -211,14 +211,14 @@ SECTIONS: dict[str, tuple[str, tuple[Key, ...]]] = {
             Key("B", "[[-0.001, 0.001]]", "general: see A"),
             Key("C", "[5.0]", "general: see A"),
             Key("D", "[-2.0, 2.0]", "general: see A"),
-            Key("command", '"duty"', "recover: column that the law put out; that of [drive] if left out"),
+            Key("command", '"duty"', "recover: column that the law put out; that of [drive] if omitted"),
             Key("feedforward", '"ff"', "recover: columns that were added to the law's output"),
-            Key("units", '"log"', 'gains between the columns of the log as its program had them; "SI" if left out'),
-            Key("sign", "-1", "of the law's output in the drive's; that of the drive if left out, 1 in SI"),
+            Key("units", '"log"', 'gains between the columns of the log as its program had them; "SI" if omitted'),
+            Key("sign", "-1", "of the law's output in the drive's; that of the drive if omitted, 1 in SI"),
             Key("limit", "5", "largest output of the law, in its own unit"),
-            Key("windup", '"hold"', 'whether sums stand still at the limit; "free" if left out'),
+            Key("windup", '"hold"', 'whether sums stand still at the limit; "free" if omitted'),
             Key("delay", "1", "samples by which the command comes late"),
-            Key("period", '"0.885 ms"', "sample period of the law, a whole part of the run's; the run's if left out"),
+            Key("period", '"0.885 ms"', "sample period of the law, a whole part of the run's; the run's if omitted"),
             Key("quantized", "true", "simulate encoder counts and rounded commands; best where nothing is fitted"),
         ),
     ),
