@@ -21,8 +21,6 @@ def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
 
     Parameters
     ----------
-    board : BoardKind
-    drive : str
     wires : sequence of Pin
         As `pins` gives them.
     """
