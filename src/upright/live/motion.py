@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from upright.errors import BadInput
-from upright.live.page import file_text, in_script, source_hash, still
+from upright.live.page import in_script, page_source, source_hash, still
 from upright.physics import Plant
 from upright.physics.outline import in_javascript
 from upright.records import Array
@@ -70,9 +70,13 @@ def motion_page(
             for c, (m, s) in zip(coordinates, columns, strict=True)
         ],
     }  # fmt: skip
-    style = file_text("play.css")
+    style = page_source("play.css")
     script = "\n".join(
-        [file_text("drawing.js"), f"const RUN = {in_script(data)};\nconst OUTLINE = {outline};", file_text("motion.js")]
+        [
+            page_source("drawing.js"),
+            f"const RUN = {in_script(data)};\nconst OUTLINE = {outline};",
+            page_source("motion.js"),
+        ]
     )
     view, picture = still(plant, [float(s[0]) for _, s in columns])
     return rendered(

@@ -50,11 +50,11 @@ def page(
     """
     from markupsafe import Markup
 
-    style = file_text("play.css")
+    style = page_source("play.css")
     numbers_of = in_script({k: v for k, v in data.items() if k != "outline"})
     known = f"const DATA = {numbers_of};\nconst OUTLINE = {data['outline']};"
-    scripts = [*(path.read_text(encoding="utf-8") for path in SCRIPTS), file_text("drawing.js")]
-    parts = [*scripts, known, "/* the page begins */", file_text("play.js")]
+    scripts = [*(path.read_text(encoding="utf-8") for path in SCRIPTS), page_source("drawing.js")]
+    parts = [*scripts, known, "/* the page begins */", page_source("play.js")]
     script = "\n".join(parts)
     view, picture = still(plant, [*data["start"]][::2])
     driven = data["coordinates"][data["moved"]]["meaning"].rpartition(" of the ")[2]
@@ -98,7 +98,7 @@ def still(plant: Plant, q: Sequence[float]) -> tuple[str, str]:
     return f"{-1.1 * far:.4g} {-1.15 * high:.4g} {2.2 * far:.4g} {2.3 * high:.4g}", "".join(drawn)
 
 
-def file_text(name: str) -> str:
+def page_source(name: str) -> str:
     """A script or a style of this room."""
     return files("upright.live").joinpath(name).read_text(encoding="utf-8")
 
