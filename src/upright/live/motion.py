@@ -23,7 +23,13 @@ MOST = 3600
 
 
 def motion_page(
-    plant: Plant, t: Array, measured: Mapping[str, Array], simulated: Mapping[str, Array], *, name: str, said: str = ""
+    plant: Plant,
+    t: Array,
+    measured: Mapping[str, Array],
+    simulated: Mapping[str, Array],
+    *,
+    name: str,
+    remark: str = "",
 ) -> str:
     """The page of a run.
 
@@ -37,7 +43,7 @@ def motion_page(
         Motion by coordinate [rad or m]; what was simulated alone is drawn so, what neither has stands at zero.
     name : str
         Of the run.
-    said : str
+    remark : str
         What else a reader must know.
 
     Raises
@@ -71,20 +77,15 @@ def motion_page(
         ],
     }  # fmt: skip
     style = page_source("play.css")
-    script = "\n".join(
-        [
-            page_source("drawing.js"),
-            f"const RUN = {in_script(data)};\nconst OUTLINE = {outline};",
-            page_source("motion.js"),
-        ]
-    )
+    run = f"const RUN = {in_script(data)};\nconst OUTLINE = {outline};"
+    script = "\n".join([page_source("drawing.js"), run, page_source("motion.js")])
     view, picture = still(plant, [float(s[0]) for _, s in columns])
     return rendered(
         "upright.live", "motion.html",
         policy=f"default-src 'none'; script-src {source_hash(script)}; style-src {source_hash(style)}",
         style=Markup(style), script=Markup(script), picture=Markup(picture), view=view, name=name, frames=frames,
         strips=[_strip(c.name, c.unit, m, s) for c, (m, s) in zip(coordinates, columns, strict=True)],
-        drawn="Drawn to scale from the plant's numbers, rods as if uniform.", said=said,
+        drawn="Drawn to scale from the plant's numbers, rods as if uniform.", remark=remark,
     )  # fmt: skip
 
 

@@ -124,7 +124,7 @@ def run_page(score: RunScore, plant: Plant, label: str) -> str:
     ahead = "" if score.horizon is None else f"Predicted {score.horizon:g} s ahead, again and again. "
     missing = [c.name for c in plant.coordinates if c.name not in measured]
     still = f"Not measured, drawn at zero: {', '.join(missing)}." if missing else ""
-    return motion_page(plant, score.t[order], measured, simulated, name=label, said=f"{ahead}{still}")
+    return motion_page(plant, score.t[order], measured, simulated, name=label, remark=f"{ahead}{still}")
 
 
 def live_part(name: str, draw: Callable[[], str], title: str = "Push it", *, short: bool = False) -> tuple[Part, ...]:
