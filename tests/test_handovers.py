@@ -116,6 +116,16 @@ def test_a_held_out_log_is_predicted_whatever_it_came_in(form, given, forms, tmp
     assert min(p for run in scores.values() for p in run.fit_percent.values()) > 99
 
 
+@pytest.mark.parametrize("form", ["fit", "path", "text", "folder"])
+def test_a_fit_is_compared_with_itself_whatever_it_came_in(form, forms):
+    compared = up.compare([forms["fit"], forms[form]], driven(0.05))
+    one, other = (compared.table.iloc[:, k].tolist() for k in (0, 1))
+    assert one == pytest.approx(other, rel=1e-9)
+    (by,) = compared.agree.values()
+    assert {a.word for a in by.values()} == {"agree"}
+    assert {a.difference for a in by.values()} == {0.0}
+
+
 def test_the_fit_predicts_as_the_verb_does(fit):
     assert fit.predict(driven(0.05)).value.runs["log"].fit_percent == pytest.approx(
         up.predict(fit, driven(0.05)).value["log"].fit_percent

@@ -79,14 +79,10 @@ class RigRun:
 
     Attributes
     ----------
-    request : RunRequest
-    file : RigFile
     model : Rig
         As it is known.
-    end : RunEnd
     log : RunLog or None
         None where no loop began.
-    log_path : Path
     basis : Basis
         Of the law, and of the model that the supervisor compared the rig with.
     """
@@ -219,7 +215,6 @@ def run_rig(
 
     Parameters
     ----------
-    request : RunRequest
     folder : Path
         Takes the log.
     watch : callable
