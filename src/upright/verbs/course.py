@@ -338,8 +338,10 @@ def survey(
     limits = (int(ends[1]), int(ends[2]))
     if isinstance(file, str | os.PathLike):
         file = Path(file)
+        if not file.exists():
+            raise BadInput(f"the sheet {file} does not exist; check the path.")
         sheet, name, command = read_sheet(file, scale=limits), file.name, f"upright survey {typed(file)}"
-    elif hasattr(file, "to_csv"):
+    elif hasattr(file, "to_csv") and hasattr(file, "iloc"):
         sheet, name, command = read_table(file.to_csv(index=bool(file.index.name)), "frame", scale=limits), "frame", ""
     else:
         raise BadInput(f"survey takes a CSV file or a pandas DataFrame, got {type(file).__name__}.")
