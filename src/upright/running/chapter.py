@@ -100,7 +100,9 @@ def checkup_chapter(checkup: Checkup, rig: str) -> Chapter:
     words = {True: "good", False: "wrong", None: "not looked at"}
     rows = tuple((f.what, f.observed, words[f.good]) for f in checkup.findings)
     again = f"upright rig doctor {rig}"
-    if checkup.sound:
+    if checkup.sound and any(f.what == "the drive" for f in checkup.findings):
+        step = Step("Supply on, and try the drive.", again)
+    elif checkup.sound:
         step = Step("Close a loop on it.", f"upright run --rig {rig} --law design.json --duration 30")
     elif checkup.written is not None:
         step = Step(f"The counts are in {rig} now; look again.", again)

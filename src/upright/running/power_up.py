@@ -374,10 +374,13 @@ class FirstPowerUp:
         else:
             self.wait(silence)
         tick = self.rig.exchange(0.0)
-        good = bool(tick.faults & (Fault.WATCHDOG | Fault.STALE)) and tick.mode == Mode.FAULT
-        shown = f"{1e3 * silence:.4g} ms of silence: {fault_text(tick.faults) if good else 'it went on'}"
-        yield CheckupFinding(what="watchdog", observed=shown, good=good,
-                             fix="" if good else "do not run it; flash the firmware again")  # fmt: skip
+        good = bool(tick.faults & (Fault.WATCHDOG | Fault.STALE))
+        shown = f"{1e3 * silence:.4g} ms of silence: {fault_text(tick.faults) if tick.faults else 'it went on'}"
+        if tick.faults and not good:  # stopped by something else, before
+            yield CheckupFinding(what="watchdog", observed=shown, good=None)
+        else:
+            yield CheckupFinding(what="watchdog", observed=shown, good=good,
+                                 fix="" if good else "do not run it; flash the firmware again")  # fmt: skip
         with suppress(RigStopped):
             self.rig.stop()
             self.rig.clear_fault()
