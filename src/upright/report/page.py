@@ -13,7 +13,7 @@ from typing import Any
 
 from upright.basis import SIMULATED, Basis
 from upright.files import plain_values
-from upright.report.symbols import symbol
+from upright.report.symbols import slanted
 
 
 class Symbol(str):
@@ -31,7 +31,7 @@ class Symbol(str):
         from html import escape
 
         name, rest = self.divided()
-        return symbol(name) + escape(rest)
+        return slanted(name) + escape(rest)
 
 
 @dataclass(frozen=True, kw_only=True)
