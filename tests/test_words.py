@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
 import re
+import statistics
 import tokenize
 from pathlib import Path
 
@@ -82,3 +84,56 @@ def test_a_word_is_defined_once_and_none_by_the_words_that_it_replaced():
     assert len(terms) == len(set(terms)) > 40
     assert all(meaning.strip().endswith(".") for cell, meaning in rows if cell.strip() != "term")
     assert not [meaning for _, meaning in rows if ANYWHERE.search(meaning)]
+
+
+WRITTEN = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
+    *(p for pattern in ("*.md", "*.ipynb") for p in sorted((ROOT / "docs").rglob(pattern)) if "_build" not in p.parts),
+]
+DIALECT = re.compile(
+    r"\b(told|wish(es|ed)?|abreast|shaken|quanta|quantum|foresees?|foreseen|fore(told|tells)|of the make|lying"
+    r"|least cost|at hand|by heart|nobody (said|gave)|come after|e-folds|columns that lie)\b",
+    re.IGNORECASE,
+)
+"""Terms that the glossary replaced."""
+
+
+def prose(path: Path) -> str:
+    """Sentences of a page, or of a notebook's text: no code, tables, headings or formulas."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        cells = [cell for cell in json.loads(text)["cells"] if cell["cell_type"] == "markdown"]
+        text = "\n\n".join("".join(cell["source"]) for cell in cells)
+    text = re.sub(r"```.*?```|\$\$.*?\$\$", "", text, flags=re.S)
+    return re.sub(r"^(    .*|\s*\|.*|#.*|<.*>|:::.*)$", "", text, flags=re.M)
+
+
+def sentence_lengths(text: str) -> list[int]:
+    """Words of each sentence; code and formulas count as one, fragments of less than three words not at all."""
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    text = re.sub(r"`[^`]*`|\$[^$]*\$", "X", text)
+    lengths: list[int] = []
+    for paragraph in re.split(r"\n\s*\n|\n(?=\s*(?:[*-]|\d+\.) )", text):
+        for sentence in re.split(r"(?<=[.!?:])\s+(?=[A-Z*_(\"X])", " ".join(paragraph.split())):
+            lengths.append(len(re.findall(r"[\w'’-]+", sentence)))
+    return [n for n in lengths if n > 2]
+
+
+def test_words_of_sentences_are_counted():
+    assert sentence_lengths("One two three. Four `a b c` six!\n\n* A [link here](x.md) is read.") == [3, 3, 5]
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
+def test_half_of_the_sentences_of_a_page_have_at_most_25_words(page):
+    lengths = sentence_lengths(prose(page))
+    assert not lengths or statistics.median(lengths) <= 25
+
+
+def test_half_of_all_sentences_of_the_documentation_have_at_most_18_words():
+    assert statistics.median([n for page in WRITTEN for n in sentence_lengths(prose(page))]) <= 18
+
+
+@pytest.mark.parametrize("page", [p for p in WRITTEN if p.name != "glossary.md"], ids=lambda page: page.name)
+def test_no_page_has_a_term_that_was_replaced(page):
+    text = prose(page) + "\n".join(line for line in page.read_text(encoding="utf-8").splitlines() if line[:1] == "#")
+    assert [found[0] for found in DIALECT.finditer(text)] == []

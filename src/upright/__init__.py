@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, observer, place, prefilter
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
+    from upright.verbs.model.compare import compare
     from upright.verbs.model.frequency import frequency
     from upright.verbs.model.identify import identify
     from upright.verbs.model.ladder import ladder
@@ -115,6 +116,7 @@ _HOMES = {
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
     "systems": ("StateSpace",),
     "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "observer", "place", "prefilter"),
+    "verbs.model.compare": ("compare",),
     "verbs.model.frequency": ("frequency",),
     "verbs.model.identify": ("identify",),
     "verbs.model.ladder": ("ladder",),
@@ -128,7 +130,7 @@ __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rig", "Rule",
     "StateSpace",
-    "UprightError", "__version__", "chain", "chance", "design", "dlqr", "doctor", "export",
+    "UprightError", "__version__", "chain", "chance", "compare", "design", "dlqr", "doctor", "export",
     "firmware_build", "firmware_flash", "firmware_pins", "frequency", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
     "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "play", "predict", "prefilter", "quantity",

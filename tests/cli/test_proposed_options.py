@@ -21,7 +21,7 @@ from upright.rig.makes import make_rig
 
 SOURCE = Path(upright.__file__).parent
 RUNNER = CliRunner()
-OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
+OPTION = re.compile(r"(?<![\w-])(?<!var\()--[a-z][a-z-]*")
 PROPOSED = re.compile(rf"upright ({'|'.join([*(f'{a} {b}' for a, bs in NESTED.items() for b in bs), *COMMANDS])})\b")
 OTHERS = {
     "--upload", "--path", "--eval", "--mjcf", "--show-plot", "--start-values", "--always", "--dirty", "--error-unmatch",

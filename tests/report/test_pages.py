@@ -106,10 +106,10 @@ def test_every_table_has_headings_and_every_picture_words(chapter):
     tables, pictures = blocks(chapter, Table), blocks(chapter, Picture)
     assert len(page.tables) == page.tags.count("caption") == len(tables)
     for head, *rows in page.tables:
-        assert {kind for kind, _ in head} == {"th col"}
+        assert {kind for kind, text in head if text} == {"th col"}
         assert rows
         for row in rows:
-            assert [kind for kind, _ in row] == ["th row"] + ["td"] * (len(head) - 1)
+            assert [kind for kind, _ in row] == ["th row" if row[0][1] else "td"] + ["td"] * (len(head) - 1)
     pictures += [chapter.drawing] if chapter.drawing else []
     assert page.tags.count("figure") == page.tags.count("figcaption") == page.tags.count("svg") == len(pictures)
     described = page.named("div", "aria-label")
@@ -139,19 +139,30 @@ def test_paper_holds_the_verdict_and_every_number(chapter, tmp_path):
 
 def test_the_terminal_says_the_same_numbers(chapter):
     lines = StringIO()
-    print_chapter(Console(file=lines, width=300, highlight=False), chapter, [Path("out/report.html")])
+    print_chapter(Console(file=lines, width=300, highlight=False), chapter, [Path("out/numbers.json")])
     said, page = lines.getvalue(), squeezed(Page(html_page(chapter)).prose)
     for table in blocks(chapter, Table, aside=False):
         assert table.caption in said
         for row in table.rows:
             assert all(cell in said for cell in row)
             assert all(isinstance(cell, Symbol) or squeezed(cell) in page for cell in row)
-    for needed in (chapter.verdict, "out/report.html", *chapter.warnings):
+    for needed in (chapter.verdict, "out/numbers.json", *chapter.warnings):
         assert needed in said
     for step in chapter.steps:
         assert step.sentence in said
         assert all(line in said for line in step.command.splitlines())
     no_computer_s_word_for_nothing(said)
+
+
+def test_the_terminal_names_the_evidence_that_the_page_folds_away(chapter):
+    lines = StringIO()
+    print_chapter(Console(file=lines, width=300, highlight=False), chapter, [Path("out/report.html")])
+    said = lines.getvalue()
+    folded = [part for part in chapter.parts if part.folded and not part.aside]
+    assert all(part.title in said for part in folded)
+    assert ("Evidence in out/report.html" in said) == bool(folded)
+    captions = {b.caption for part in folded for b in part.content if isinstance(b, Table)}
+    assert not [caption for caption in captions if caption in said]
 
 
 @pytest.mark.parametrize("width", [80, 60])

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from upright.identification.ladder.decision import Comparison
+from upright.identification.ladder.decision import RungComparison
 from upright.identification.ladder.growth import RungResult
 from upright.identification.ladder.repeats import Repeats
 from upright.identification.ladder.rungs import Rung
@@ -87,7 +87,7 @@ def test_a_ladder_s_file_holds_every_step_and_what_repeats_allow():
         rung=Rung(name="dry", adds=("b_1c",)), accepted=True, reason="better", fitted={"run": {"theta": 95.0}},
         predicted={"other": {"theta": 91.5}}, cost=1.25, parameters=4, per_run=2, values={"b_1c": 0.01},
         seconds=1.23456,
-        comparison=Comparison(gain=0.5, scatter=0.1, pairs=3, between="runs"),
+        comparison=RungComparison(gain=0.5, scatter=0.1, pairs=3, between="runs"),
     )  # fmt: skip
     two = RungResult(
         rung=Rung(name="late"), accepted=False, reason="no better", fitted={}, predicted={}, cost=1.2, parameters=5,

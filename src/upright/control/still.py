@@ -2,7 +2,8 @@
 
 The driven body stands still where its command is within friction, for as long as it likes; beyond `HELD_BY` times the
 friction that the model knows of, it moves. The pendulum on it stands still, to a count, only while what carries it is
-not accelerated: ``theta'' = psi''/rho`` but for gravity, and hinges hold little. What else holds either is a hand.
+accelerated against what its lean makes of it: ``theta'' = psi''/rho + a_33 theta``, where hinges hold little and the
+lean is known to `OUT_OF_TRUE`. What else holds either is a hand.
 """
 
 from __future__ import annotations
@@ -10,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from upright.control.watch import held_by
+from upright.control.watch import OUT_OF_TRUE, held_by
 from upright.rig import Rig
 
 UNSEEN, EXCESS, FOR = 40, 0.5, 0.1
 """A driven body cannot have moved by so many counts without its encoder showing one; nor as far as half of what holds
 it at most takes it in so long [s], since a hand and friction of the day may be so much more."""
-SWUNG, LEAST_SWUNG = 0.05, 12
+SWUNG, LEAST_SWUNG = 0.02, 12
 """Nor a pendulum by such an angle [rad], and by so many counts."""
 WITHIN = 0.3
 """And it must have swung within so long [s]: a hinge that sticks holds it while the body drifts slowly."""
@@ -54,9 +55,11 @@ class StillPendulum:
     """Whether a pendulum shows not a single count although what carries it left the straight line that it was on."""
 
     def __init__(self, model: Rig, at: str) -> None:
-        B = model.linear(at).B[1::2, 0]
+        linear = model.linear(at)
+        B = linear.B[1::2, 0]
         self._body = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
         self.which = 1 - self._body
+        self._gravity = float(linear.A[2 * self.which + 1, 2 * self.which])
         self.name = model.plant.coordinates[self.which].name
         self._rho, self._period = float(B[self._body] / B[self.which]), model.period
         self._least = max(SWUNG, LEAST_SWUNG / model.per_unit[self.which])
@@ -74,4 +77,5 @@ class StillPendulum:
             self._shown, self._from, self._speed, self._for = shown, self._behind, speed, 0.0
         self._for += self._period
         off = self._behind - self._from - self._speed * self._for
-        return abs(off / self._rho) > self._least
+        falls = 0.5 * self._gravity * self._for**2
+        return abs(off / self._rho + falls * shown) - abs(falls) * OUT_OF_TRUE > self._least

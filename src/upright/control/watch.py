@@ -1,20 +1,13 @@
 """What is wrong with a loop that holds a pendulum upright: an encoder, the drive, or nothing but a hand and friction?
 
-Three witnesses say how what carries the pendulum is accelerated. With the model's rows about the equilibrium,
-``psi'' = a_11 psi' + a_12 theta + a_13 theta' + b_1 u + d`` and ``theta'' = ... + (b_1 u + d)/rho + h``, where d is
-friction or a hand at the body and h a hand at the pendulum,
-
-    X = psi'' - a_11 psi' - ...          = b_1 u + d            what its own encoder shows
-    Y = rho (theta'' - a_31 psi' - ...)  = b_1 u + d + rho h    what the pendulum on it shows
-    Z = b_1 u                                                   what the command says,
-
-each behind the same low-pass ``(w/(s + w))^2``, so that nothing is differentiated. A hand at the body parts Z from the
-others and one at the pendulum parts Y, at any moment and as much as it likes: both are disturbances with heavy tails
-(Student's t), and friction as far as it is known, times `HELD_BY`, costs nothing. A suspicion, such as "theta shows
-half of what is true", scales one of the three for ever. The logarithms of the likelihood ratios add up and fade (Page's
-test with a memory; Lorden, Ann. Math. Stat. 42 (1971) 1897: with independent samples of the law assumed a bound of b is
-passed by chance once in e^b of them). Hands and taps are not that law, so the bounds are those of the largest of many
-sound runs (Gumbel), by kind of suspicion: see `BOUNDS`.
+Three witnesses (`control.witnesses`) say how what carries the pendulum is accelerated: X is its own encoder, Y the
+pendulum on it, Z the command. A hand at the body parts Z from the others and one at the pendulum parts Y, at any moment
+and as much as it likes: both are disturbances with heavy tails (Student's t), and friction as far as it is known, times
+`HELD_BY`, costs nothing. A suspicion, such as "theta shows half of what is true", scales one of the three for ever. The
+logarithms of the likelihood ratios add up and fade (Page's test with a memory; Lorden, Ann. Math. Stat. 42 (1971) 1897:
+with independent samples of the law assumed a bound of b is passed by chance once in e^b of them). Hands and taps are
+not that law, so the bounds are those of the largest of many sound runs (Gumbel), by kind of suspicion: see `BOUNDS`.
+What no hand explains does not wait for that: see `control.gross`.
 
 What is slow moves none of that: a zero that drifts makes the pendulum lean, for what it shows, without what carries it
 being accelerated. ``(Y - X)/kappa``, with kappa the stiffness of theta in Y - X, is that lean; it is judged by a
@@ -26,14 +19,15 @@ does.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upright.control.gross import GrossFaults
 from upright.control.trial import Trial, trial
+from upright.control.witnesses import Witnesses
 from upright.laws import Law
 from upright.records import Array
 from upright.rig import Rig
@@ -53,7 +47,7 @@ HELD_BY, DRY = 2.0, 0.003
 """A body is held at most by so many times the dry friction that the model knows of; where it knows of none, by such a
 share of the largest command."""
 BOUNDS = {
-    ("body", 0.0): 8.0, ("body", -1.0): 6.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
+    ("body", 0.0): 8.0, ("body", -1.0): 13.0, ("body", 0.25): 7.5, ("body", 0.5): 6.0, ("body", 2.0): 20.0,
     ("body", 4.0): 20.0, ("other", 0.0): 12.0, ("other", -1.0): 7.0, ("other", 0.25): 19.0, ("other", 0.5): 19.0,
     ("other", 2.0): 5.5, ("other", 4.0): 7.0, ("drive", 0.25): 4.6, ("drive", 0.5): 4.6,
 }  # fmt: skip
@@ -133,10 +127,8 @@ def watched(
 
     Parameters
     ----------
-    watch : Watch
     rig : Rig
         As it truly is.
-    law : Law
     start, seconds, rest
         As of `trial`.
     """
@@ -171,40 +163,36 @@ class Watch:
     def __init__(self, model: Rig, at: str = "inverted") -> None:
         names = [c.name for c in model.plant.coordinates]
         self.model, self.at = model, at
-        self._body = names.index(model.plant.inputs[0].on)
-        self._other = 1 - self._body
-        kinds = [("body", names[self._body], f) for f in FACTORS] + [("other", names[self._other], f) for f in FACTORS]
+        body = names.index(model.plant.inputs[0].on)
+        other = 1 - body
+        kinds = [("body", names[body], f) for f in FACTORS] + [("other", names[other], f) for f in FACTORS]
         kinds += [("drive", "the drive", f) for f in STRENGTHS]
-        slips = Suspicion(name=names[self._other], factor=1.0)
+        slips = Suspicion(name=names[other], factor=1.0)
         self.suspicions = (Suspicion(), *(Suspicion(name=n, factor=f) for _, n, f in kinds), slips)
         self._factor = {kind: np.array([[f if k == kind else 1.0] for k, _, f in kinds]) for kind in
                         ("body", "other", "drive")}  # fmt: skip
         self._bounds = np.array([[BOUNDS[kind, f]] for kind, _, f in kinds])
-        A, B = model.linear(at).A, model.linear(at).B[:, 0]
-        body, other = 2 * self._body + 1, 2 * self._other + 1
-        self._drive, self._rho = float(B[body]), float(B[body] / B[other])
-        # of the body's row and the other's: by speed of the body, by place and speed of the other
-        self._rows = [[float(A[row, k]) for k in (body, other - 1, other)] for row in (body, other)]
-        self._kappa = float(A[body, other - 1] - self._rho * A[other, other - 1])
-        T = model.period
-        self._late = 1 + round((model.delay + model.lag) / T)
-        self._pass, self._look = CORNER * T, max(1, round(_EVERY / T))
-        step = self._look * T
+        self._witnesses = Witnesses(model, at, CORNER)
+        rho, rows = self._witnesses.rho, self._witnesses.rows
+        self._kappa = rows[0][1] - rho * rows[1][1]
+        self._look = max(1, round(_EVERY / model.period))
+        step = self._look * model.period
         self._slow, self._memory = SLOWEST * step, math.exp(-step / MEMORY)
         self._weight, self._step = CORNER * step / 2, step  # independent samples in a look
         self._friction = held_by(model, at)
+        self.gross = GrossFaults(model, at, self._friction)
+        listed = [(s.name, s.factor) for s in self.suspicions]
+        self._gross = np.array([listed.index(kind) for kind in self.gross.kinds])
         rounding = 0.3 * CORNER**2 * model.resolution
         level = abs(self._kappa) * LEVEL
-        self._of_body = level + float(rounding[self._body])
-        self._of_other = self._of_body + abs(self._rho) * float(rounding[self._other])
+        self._of_body = level + float(rounding[body])
+        self._of_other = self._of_body + abs(rho) * float(rounding[other])
         self._begin(1)
 
     def _begin(self, lanes: int) -> None:
         """Forget all that was seen."""
-        self._k = 0
-        self._passed = np.zeros((2, 3, lanes))
-        self._first: Array = np.zeros((3, lanes))
-        self._commands: deque[Array] = deque([np.zeros(lanes)] * self._late, maxlen=self._late)
+        self._witnesses.begin(lanes)
+        self.gross.begin(lanes)
         self._mean = np.zeros((5, lanes))
         self.odds: Array = np.zeros((len(self._bounds), lanes))
         self._drift = np.zeros((2, lanes))
@@ -222,40 +210,25 @@ class Watch:
         y = np.asarray(reading, dtype=np.float64)
         if len(y) != self.odds.shape[1]:
             self._begin(len(y))
-        if self._k == 0:
-            self._first[:2] = y[:, [self._body, self._other]].T
-        now = np.array([y[:, self._body], y[:, self._other], self._commands[0]]) - self._first
-        self._commands.append(np.broadcast_to(np.asarray(command, dtype=np.float64), len(y)))
-        once, twice = self._passed
-        once += self._pass * (now - once)
-        twice += self._pass * (once - twice)
-        self._k += 1
-        if self._k % self._look == 0:
-            self._weigh(now, once, twice)
+        self.gross.see(y, command)
+        self._witnesses.see(y, command)
+        if self._witnesses.samples % self._look == 0:
+            self._weigh(self._witnesses.parts(), np.abs(self._witnesses.lean))
         return self.odds.max(axis=0)
 
-    def _weigh(self, now: Array, once: Array, twice: Array) -> None:
-        acceleration = CORNER**2 * (now - 2 * once + twice)
-        speed, place = CORNER * (once - twice), twice + self._first
-        (a, b, c), (d, e, f) = self._rows
-        parts = np.array([
-            acceleration[0] - a * speed[0], -b * place[1] - c * speed[1],
-            self._rho * (acceleration[1] - e * place[1] - f * speed[1]), -self._rho * d * speed[0],
-            self._drive * twice[2],
-        ])  # fmt: skip
+    def _weigh(self, parts: Array, lean: Array) -> None:
         self._lean((parts[2] + parts[3] - parts[0] - parts[1]) / self._kappa)
         self._mean += self._slow * (parts - self._mean)
         costs = self._costs(parts - self._mean)
         gained = costs[0] - costs[1:]
-        gained[0] = self._dead(parts)
+        gained[0], gained[1] = self._dead(parts), self._turned(parts)
         self.odds *= self._memory
         self.odds += self._weight * gained
-        self.odds[0] = np.maximum(0.0, self.odds[0])  # of a counter that moved a moment ago nothing is held against it
-        lean = np.abs(place[1])
-        ranked = np.sort(self.odds, axis=0)
+        self.odds = np.maximum(self.odds, 0.0)  # a part that was sound a moment ago may be broken now
+        ranked, k = np.sort(self.odds, axis=0), self._witnesses.samples
         beyond = (self.odds > self._bounds).any(axis=0)
-        self._since = np.where(beyond, np.where(self._since < 0, self._k, self._since), -1)
-        waited = (self._k - self._since) * self.model.period
+        self._since = np.where(beyond, np.where(self._since < 0, k, self._since), -1)
+        waited = (k - self._since) * self.model.period
         sure = (ranked[-1] - ranked[-2] > LEADS) | (lean > SAFE) | (waited >= PATIENCE)
         drifts = (self._drift > DRIFTED).any(axis=0)
         self._says = beyond & sure | drifts
@@ -301,9 +274,30 @@ class Watch:
         sound = _surprise(free) + _surprise((Y - X) / far)
         return sound - _surprise((Y - Z) / far) - _surprise(of_body / self._of_body)
 
+    def _turned(self, parts: Array) -> Array:
+        """Logarithm of the odds of this look, shape (lanes,), that the body's encoder shows the wrong way round.
+
+        Slow motions count too, and friction is an excuse only for what it brakes: it drives nothing on.
+        """
+        of_body, by_other, of_other, by_body, Z = parts
+        X, Y = of_body + by_other, of_other + by_body
+        largest = RELATIVE * np.abs(np.array([X, Y, Z])).max(axis=0)
+        near, far = self._of_body + 0.25 * self._friction + largest, self._of_other + largest
+        speed = self._witnesses.speed[0]
+        unsure = np.abs(speed) < (2 * np.abs(X) + self._of_body) / CORNER  # it turned a moment ago
+
+        def cost(way: float) -> Array:
+            x, y = way * of_body + by_other, of_other + way * by_body
+            brakes = unsure | ((x - Z) * way * speed < 0)
+            free = np.maximum(0.0, np.abs(x - Z) - np.where(brakes, self._friction, 0.0))
+            return _surprise(free / near) + _surprise((y - x) / far)
+
+        return cost(1.0) - cost(-1.0)
+
     def speaks(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
         """Whether the drive is to be switched off after the last reading, and for which suspicion, lane by lane."""
-        return self._says, self._best
+        grossly, which = self.gross.speaks()
+        return self._says | grossly, np.where(grossly, self._gross[which], self._best)
 
     def weak(self, lane: int = 0) -> bool:
         """Whether a body that shows nothing is likelier driven by too little than read by a dead encoder."""
@@ -314,6 +308,9 @@ class Watch:
         """What may be wrong, likeliest first, as far as one is not plainly less likely than the next; none where all
         is as likely to be sound.
         """
+        grossly, which = self.gross.speaks()
+        if grossly[lane]:
+            return (self.suspicions[self._gross[which[lane]]],)
         if self._says[lane] and self._best[lane] == len(self.suspicions) - 1:
             return (self.suspicions[-1],)
         odds = self.odds[:, lane]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from upright.gains.requests import Roots, written
 from upright.laws import as_values
 from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
-from upright.report.rig import rig_table
+from upright.report.rig import rig_drawing, rig_table
 from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
 from upright.rig import Rig
@@ -69,7 +70,8 @@ def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = "."
         warnings=_doubts(design),
         numbers=_numbers(design),
     )
-    return resting_on(page, design.basis)
+    page = resting_on(page, design.basis)
+    return page if isinstance(design.rig, StateSpace) else replace(page, drawing=rig_drawing(design.rig.plant))
 
 
 def _delay_from(design: Designed) -> str:

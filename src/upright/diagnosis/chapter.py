@@ -21,7 +21,6 @@ def chapter(diagnosis: Diagnosis, *, log: Path, rig: str = "", page: bool = True
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     log : Path
         As it was typed.
     rig : str
@@ -114,7 +113,7 @@ def finding_figure(finding: Finding) -> Figure:
                 ax.plot(t, y, color=colour, linestyle=line, drawstyle=step, label=curve.name)
         ax.set_ylabel(panel.label, rotation=0, ha="right", va="center", fontsize=8.5, parse_math=False)
         if len(panel.curves) > 1:
-            legend = ax.legend(loc="best", fontsize=7.5)
+            legend = ax.legend(loc="best", fontsize=8.5)
             for text in legend.get_texts():
                 text.set_parse_math(False)
         ax.margins(x=0.01)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from upright.errors import BadInput
 from upright.physics import Plant
 from upright.physics.regressor import Regressor, regressor
 from upright.records import Array
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import dominant_period, middle, noise_gain, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.study.sensors import Grid
@@ -166,18 +168,15 @@ class Row:
         known = {who: (text, x[here]) for who, (text, x) in self.known.items()}
         return Row(target=self.target[here], known=known, free=[x[here] for x in self.free])
 
-    @property
-    def columns(self) -> Array:
-        """What is known, then the others, (N, p), each of length one."""
-        columns = [*(x for _, x in self.known.values()), *self.free]
-        return np.column_stack([x / (float(np.linalg.norm(x)) or 1.0) for x in columns])
+    @cached_property
+    def regression(self) -> LeastSquares:
+        """On what is known, then on the others."""
+        return LeastSquares.of([*(x for _, x in self.known.values()), *self.free], self.target)
 
     @property
     def left(self) -> float:
         """Share of the acceleration's square that all columns leave."""
-        A = self.columns
-        rest = self.target - A @ np.linalg.lstsq(A, self.target, rcond=1e-10)[0]
-        return float(rest @ rest) / (float(self.target @ self.target) or 1.0)
+        return self.regression.squares / (float(self.target @ self.target) or 1.0)
 
 
 def simplest(left: Sequence[float]) -> int:
@@ -198,7 +197,7 @@ def driven_row(motion: SmoothedMotion, here: NDArray[np.bool_]) -> list[tuple[Ar
     plant = motion.plant
     driven = [c.name for c in plant.coordinates].index(plant.inputs[0].on) if plant.inputs else -1
     rows = [row.at(here) for row in _forms(replace(motion, u=0 * motion.u), driven)] if driven in motion.rows else []
-    return [(row.target, row.columns) for row in rows]
+    return [(row.target, row.regression.columns) for row in rows]
 
 
 def _row(motion: SmoothedMotion, i: int) -> Row | None:
@@ -305,14 +304,11 @@ def _size(x: Array) -> float:
 
 
 def _row_terms(motion: SmoothedMotion, i: int) -> list[Term]:
-    """Regression of one acceleration where the body slides."""
+    """LeastSquares of one acceleration where the body slides."""
     row = _row(motion, i)
     if row is None or not row.known or not np.std(row.target) > 0:
         return []
-    target, A = row.target, row.columns
-    coefficients, *_ = np.linalg.lstsq(A, target, rcond=1e-10)
-    rest = target - A @ coefficients
-    total = float(rest @ rest) / float(target @ target)
+    target, A = row.target, row.regression.columns
     out: list[Term] = []
     for k, (who, (text, column)) in enumerate(row.known.items()):
         Q = np.linalg.qr(np.delete(A, k, axis=1))[0]
@@ -322,9 +318,9 @@ def _row_terms(motion: SmoothedMotion, i: int) -> list[Term]:
             Term(
                 who=who,
                 text=text,
-                slope=float(coefficients[k]) / (float(np.linalg.norm(column)) or 1.0),
-                share=1 - float(rest @ rest) / power if power > 0 else 0.0,
-                total=total,
+                slope=float(row.regression.slopes[k]),
+                share=1 - row.regression.squares / power if power > 0 else 0.0,
+                total=row.left,
                 target=left,
                 alone=alone,
                 t=motion.t[motion.slides(i)],

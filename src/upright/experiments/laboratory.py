@@ -25,7 +25,7 @@ from upright.experiments.stand.twin import TwinStand
 from upright.experiments.table import EXPERIMENTS, Experiment, ExperimentInput
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
-from upright.report.page import Book, Chapter, Step, as_plain, from_plain
+from upright.report.page import PAPER, Book, Chapter, Step, as_plain, from_plain
 from upright.report.symbols import typed
 from upright.rig.makes import MAKES, make_rig
 from upright.workers import HERE, Workers
@@ -40,13 +40,10 @@ class ExperimentResult:
 
     Attributes
     ----------
-    experiment : Experiment
     make, rig : str
         Kind of rig, and its name.
-    chapter : Chapter
     state : str
         ``"done"``, ``"kept"`` from an earlier run, ``"stopped"`` half-way, or ``"failed"``.
-    seconds : float
     """
 
     experiment: Experiment
@@ -285,7 +282,7 @@ def _program() -> str:
     """Digest of the program as it stands: another version, or a changed line, is another experiment."""
     source = Path(__file__).parent.parent
     digest = sha256()
-    for path in sorted(source.rglob("*.py")):
+    for path in sorted(p for p in source.rglob("*") if p.suffix in (".py", ".md")):
         digest.update(path.relative_to(source).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -390,7 +387,7 @@ def book(session: Session, day: date) -> Book:
         ),
         notes=tuple(notes),
         missing=tuple((e.key, e.title) for e in session.missing),
-        steps=next_steps(session),
+        steps=next_steps(session), sources=(PAPER,),
     )  # fmt: skip
 
 

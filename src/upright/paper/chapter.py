@@ -193,9 +193,9 @@ def answers_figure(impossible: dict[int, int], claimed: int) -> Figure:
     ax = drawing.subplots()
     colours = [VERMILLION if n == claimed else BLUE if count <= 1 else GREY for n, count in impossible.items()]
     bars = ax.bar(list(impossible), list(impossible.values()), color=colours)
-    ax.bar_label(bars, fontsize=7.5)
+    ax.bar_label(bars, fontsize=8.5)
     ax.set_xticks(list(impossible))
     ax.set_xlabel("number of students who answered")
     ax.set_ylabel("impossible means")
-    ax.text(claimed, impossible[claimed] + 2.0, "as printed", ha="center", fontsize=8, color=VERMILLION)
+    ax.text(claimed, impossible[claimed] + 2.0, "as printed", ha="center", fontsize=8.5, color=VERMILLION)
     return drawing

@@ -375,7 +375,7 @@ def agreement_figure(rows: Sequence[tuple[str, Sequence[str], Sequence[float]]])
             if share >= 7:
                 dark = tone in (BLUE, VERMILLION, GREY)
                 axes.text(start + share / 2, i, f"{share:.0f}", ha="center", va="center",
-                          color="white" if dark else "black", fontsize=8)  # fmt: skip
+                          color="white" if dark else "black", fontsize=8.5)  # fmt: skip
             start += share
     axes.set_yticks(range(len(rows)), [_short(name) for name, _, _ in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
@@ -417,7 +417,7 @@ def fitting_figure(fits: Sequence[Fits], claimed: int) -> Figure:
     axes.plot(n, share, "o", color=BLUE, markersize=2.5)
     axes.axhline(fits[0].printed, color=GREEN, linestyle="--", linewidth=0.9)
     axes.annotate(f"claimed: {claimed}", (claimed, 1.01 * fits[0].printed), (0, 4), textcoords="offset points",
-                  ha="center", va="bottom", color=VERMILLION, fontsize=8)  # fmt: skip
+                  ha="center", va="bottom", color=VERMILLION, fontsize=8.5)  # fmt: skip
     axes.set_xlabel("answers")
     axes.set_ylabel(f"possible, of {fits[0].printed} numbers")
     axes.set_ylim(0, 1.12 * fits[0].printed)

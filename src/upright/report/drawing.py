@@ -143,7 +143,7 @@ def svg(drawing: Figure, name: str) -> str:
     text = page.getvalue()
     text = text[text.index("<svg") :]
     # `Figure.savefig` writes six decimals; a hundredth of a point is finer than any printer
-    text = re.sub(r'(?<= d=")[^"]*', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), text)
+    text = re.sub(r'(?<= d=")[^"]*', _short, text)
     text = re.sub(r'\b(id=")', rf"\1{name}-", text)
     text = re.sub(r"(url\(#|href=\"#)", rf"\1{name}-", text)
     text = re.sub(r'\s(xmlns|xmlns:xlink|version)="[^"]*"', "", text)
@@ -153,6 +153,12 @@ def svg(drawing: Figure, name: str) -> str:
     responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
     return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
+
+
+def _short(path: re.Match[str]) -> str:
+    """A path in hundredths of a point, without the blanks that nobody needs."""
+    numbers = re.sub(r"(\.\d*?)0*(?=\D|$)", lambda m: m[1].rstrip("."), re.sub(r"(\.\d\d)\d+", r"\1", path[0]))
+    return re.sub(r"\s*([MLCQZz])\s*", r"\1", numbers)
 
 
 def _with_properties(style: re.Match[str]) -> str:
@@ -224,7 +230,7 @@ def draw_limits(ax: Axes, most: float, name: str, at: float) -> None:
     """Lines at plus and minus `most`, named where the curves end, `at`."""
     for side in (-1, 1):
         ax.axhline(side * most, color=GREY, linestyle="--", linewidth=0.9)
-    ax.text(at, most, f"{name} ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+    ax.text(at, most, f"{name} ", ha="right", va="bottom", fontsize=8.5, color=GREY)
 
 
 def hide_inner_times(axes: list[Axes]) -> None:

@@ -148,7 +148,7 @@ def ladder_figure(ladder: Ladder) -> Figure:
     ax.set_ylim(low - 0.08 * (100 - low), 100 + 0.04 * (100 - low))
     for i, value in enumerate(predicted):
         if value < low:
-            ax.annotate(f"{percent(value)} ↓", (i, low), ha="center", va="bottom", fontsize=8, color=VERMILLION)
+            ax.annotate(f"{percent(value)} ↓", (i, low), ha="center", va="bottom", fontsize=8.5, color=VERMILLION)
     ax.set_xlim(-0.4, len(steps) - 0.6)
     ax.set_xticks(x, [_label(s) for s in steps])
     ax.set_ylabel("mean fit [%]")

@@ -115,13 +115,15 @@ def draw_columns(record: Record, inspection: Inspection) -> Figure:
         if column.constant:
             reach = max(abs(column.low), 1.0)  # the line in the middle, and a scale that can be read
             axes.set_ylim(column.low - reach, column.low + reach)
-            axes.text(0.01, 0.9, f"constant {column.low:g}", transform=axes.transAxes, fontsize=8, color=GREY, va="top")
+            axes.text(
+                0.01, 0.9, f"constant {column.low:g}", transform=axes.transAxes, fontsize=8.5, color=GREY, va="top"
+            )
         unit = column.unit or (f"{column.guess}?" if column.guess else "")
         name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
         name = f"{name}\n[{unit}]" if unit else name  # shown as the log spells it
         axes.set_ylabel(name, rotation=0, ha="right", va="center", parse_math=False)
         if column.lies:
-            axes.set_title(column.lies[0], fontsize=8, color=GREY, parse_math=False)
+            axes.set_title(column.lies[0], fontsize=8.5, color=GREY, parse_math=False)
     hide_inner_times(panels)
     drawing.align_ylabels(panels)
     state = "grey: at rest" if moving else "nothing moves"

@@ -13,7 +13,7 @@ from typing import Any
 
 from upright.basis import SIMULATED, Basis
 from upright.files import plain_values
-from upright.report.symbols import symbol
+from upright.report.symbols import slanted
 
 
 class Symbol(str):
@@ -31,7 +31,7 @@ class Symbol(str):
         from html import escape
 
         name, rest = self.divided()
-        return symbol(name) + escape(rest)
+        return slanted(name) + escape(rest)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,6 @@ class Table:
 
     Attributes
     ----------
-    caption : str
     headings : tuple of str
     rows : tuple of tuple of str
     numbers : tuple of int
@@ -100,7 +99,6 @@ class Picture:
         Unique in its chapter; ids inside the drawing begin with it.
     draw : callable or str
         Gives the matplotlib figure, when somebody looks; or its markup.
-    caption, description : str
     interactive : callable or str
         Gives what a page on a screen draws in its place, from `report.interactive`; nothing when empty.
     """
@@ -143,11 +141,13 @@ class Live:
     ----------
     markup : str
         The page.
-    description : str
+    short : bool
+        Whether half the height will do.
     """
 
     markup: str
     description: str
+    short: bool = False
 
 
 Block = str | Points | Facts | Code | Formula | Table | Picture | Live
@@ -160,7 +160,6 @@ class Part:
 
     Attributes
     ----------
-    title : str
     content : tuple of Block
     key : str
         Anchor on the page; its number when empty.
@@ -213,18 +212,23 @@ class Step:
     command: str = ""
 
 
+PAPER = (
+    "B. T. Burchett, Four Hardware Experiments for Advanced Dynamics and Control, ASEE Annual Conference 2006, "
+    "paper 2006-1008."
+)
+"""Where the experiments are from, as a bibliography has it."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chapter:
     """Report of one log, fit, design or experiment.
 
     Attributes
     ----------
-    title : str
     verdict, detail : str
         What was learned, in a sentence; and how far it can be trusted.
     sound : bool
         Whether the verdict is one to build on.
-    question : str
     parts : tuple of Part
     warnings : tuple of str
     steps : tuple of Step
@@ -290,7 +294,6 @@ def resting_on(chapter: Chapter, basis: Basis, performed: str = "") -> Chapter:
 
     Parameters
     ----------
-    chapter : Chapter
     basis : Basis
         The model that its results rest on.
     performed : str
@@ -324,7 +327,6 @@ class Book:
 
     Attributes
     ----------
-    title : str
     facts : tuple of (str, str)
         For the cover: what was run, on which rig, when, by which program.
     chapters : tuple of Chapter
@@ -362,10 +364,9 @@ class Book:
 
     @property
     def numbers(self) -> tuple[KeyNumber, ...]:
-        """Five for the first screen: of every chapter its first, then those with intervals."""
-        firsts = [c.findings[0] for c in self.chapters if c.findings]
-        others = [f for c in self.chapters for f in c.findings[1:] if f.interval]
-        return tuple([*firsts, *others][:5])
+        """Five for the first screen: of every chapter the first with an interval, then others of these."""
+        known = [[f for f in c.findings if f.interval] for c in self.chapters]
+        return tuple([*(of[0] for of in known if of), *(f for of in known for f in of[1:])][:5])
 
     @cached_property
     def cover(self) -> tuple[Part, ...]:

@@ -11,10 +11,12 @@ from xml.etree import ElementTree
 
 from upright.errors import BadInput
 from upright.files import replace_file
-from upright.report.page import Book, Chapter, Formula, Picture, Symbol, as_plain
+from upright.report.html import mark
+from upright.report.page import Assessment, Book, Chapter, Formula, Picture, Symbol, as_plain
 from upright.report.symbols import symbol
 
 _ROOT = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+_PROPERTY = re.compile(r"var\(--[\w-]+, ([^)]*)\)")
 _SHARE = re.compile(r'\sstyle="max-width:(\d+)%"')
 
 
@@ -41,11 +43,12 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
     files: dict[str, bytes] = {}
 
     def instead(value: Any) -> Any:
-        """Pictures as files beside the template, formulas as trees of MathML's elements."""
+        """Pictures as files beside the template, formulas as trees of MathML's elements, states with their tone."""
         if isinstance(value, Picture):
             name = f"figure-{len(files)}.svg"
             share = _SHARE.search(value.svg)
-            files[name] = _SHARE.sub("", value.svg).replace("<svg", _ROOT, 1).encode()
+            markup = _PROPERTY.sub(r"\1", _SHARE.sub("", value.svg))
+            files[name] = markup.replace("<svg", _ROOT, 1).encode()
             plain = {"caption": value.caption, "description": value.description, "file": name}
             return {"kind": "Picture", **plain, "share": int(share[1]) if share else 100}
         if isinstance(value, Formula):
@@ -53,11 +56,16 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
         if isinstance(value, Symbol):
             name, rest = value.divided()
             return [_tree(ElementTree.fromstring(symbol(name))), rest]
+        if isinstance(value, Assessment):
+            return {**vars(value), "tone": mark(value.state)}
         return None
 
     content = {"version": __version__, **as_plain(page, instead)}
     if isinstance(page, Book):
         content["cover"] = as_plain(page.cover, instead)
+        content["headline"] = page.headline
+        for chapter, plain in zip(page.chapters, content["chapters"], strict=True):
+            plain |= {"state": chapter.state, "tone": mark(chapter.state)}
     files["page.json"] = json.dumps(content, ensure_ascii=False).encode()
     files["main.typ"] = (Path(__file__).parent / "templates" / "report.typ").read_bytes()
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"

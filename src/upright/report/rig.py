@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.physics import Plant
 from upright.quantities import with_unit
-from upright.report.page import Picture, Table
+from upright.report.page import Chapter, Picture, Table, resting_on
 from upright.report.symbols import parts
 from upright.rig import Rig
 from upright.rig.hardware import meaning_of
@@ -31,6 +32,11 @@ def rig_table(rig: Rig) -> Table:
         rows=tuple((meaning_of(n), with_unit(e.value, e.unit, 6), e.source)
                    for n, e in shown.items()), numbers=(1,),
     )  # fmt: skip
+
+
+def of_rig(chapter: Chapter, rig: Rig, performed: str = "") -> Chapter:
+    """The chapter with its rig's drawing, and with the verdict of the rig's model first; see `resting_on`."""
+    return replace(resting_on(chapter, rig.basis, performed), drawing=rig_drawing(rig.plant))
 
 
 def rig_drawing(plant: Plant) -> Picture | None:

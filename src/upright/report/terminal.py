@@ -17,12 +17,19 @@ _GAP = 2
 
 
 def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = (), title: str = "") -> None:
-    """Print what a chapter found on a rich console, its verdict last; `files` are those written."""
+    """Print what a chapter found on a rich console, its verdict last; `files` are those written.
+
+    Evidence that a written page folds away is only named.
+    """
+    page = next((file for file in files if file.suffix == ".html"), None)
     if chapter.first_line:
         screen.print(chapter.first_line, style="bold", soft_wrap=not screen.is_terminal, markup=False)
     if title:
         screen.print(title, soft_wrap=not screen.is_terminal, markup=False)
+    folded = [part.title for part in chapter.parts if page and part.folded and not part.aside]
     for part in chapter.parts:
+        if page and part.folded:
+            continue
         shown = [b for b in part.content if isinstance(b, Table | Points | Facts | Code)]
         if shown and not part.aside:
             screen.print(f"\n{part.title}", style="bold", soft_wrap=not screen.is_terminal, markup=False)
@@ -35,6 +42,8 @@ def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = (), tit
     for warning in chapter.warnings:
         _say(screen, "Warning", warning)
     _say(screen, "\nWritten", ", ".join(map(str, files)))
+    if folded:
+        _say(screen, f"Evidence in {page}", ", ".join(folded))
     print_steps(screen, chapter.steps)
 
 

@@ -25,10 +25,10 @@ def jitter_figure(jitter: Jitter) -> Figure:
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.axvline(1e6 * jitter.period, color=VERMILLION, linewidth=0.9)
-    axis.text(1e6 * jitter.period, axis.get_ylim()[1], " a period", color=VERMILLION, fontsize=7.5, va="top")
+    axis.text(1e6 * jitter.period, axis.get_ylim()[1], " a period", color=VERMILLION, fontsize=8.5, va="top")
     for name, value in jitter.quantiles.items():
         axis.axvline(1e6 * value, color=GREY, linestyle="--", linewidth=0.7)
-        axis.text(1e6 * value, 0.6, f" {name}", color=GREY, fontsize=7, rotation=90, va="bottom")
+        axis.text(1e6 * value, 0.6, f" {name}", color=GREY, fontsize=8.5, rotation=90, va="bottom")
     axis.set_xlabel("woken behind the deadline [µs]")
     axis.set_ylabel("ticks")
     return drawing

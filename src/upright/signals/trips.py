@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import Motion, acceleration_width, middle, scatter, smoothed
 
 Array = NDArray[np.float64]
@@ -316,7 +317,7 @@ def goes_dead(t: Array, u: Array, y: Array, at: int) -> bool:
     enough = 3 * width * dt / apart
     if np.count_nonzero(before & fast) < enough or not after.any():
         return False
-    slopes = np.linalg.lstsq(columns[before & fast], table.target[before & fast], rcond=None)[0]
+    slopes = LeastSquares.of(columns[before & fast], table.target[before & fast]).slopes
     force, _, dry, _, spring = slopes
     if force == 0:
         return False

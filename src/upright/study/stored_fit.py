@@ -20,7 +20,7 @@ from upright.basis import NOT_TRUSTED, RESERVED, TRUSTED, Basis
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.files import read_text
 from upright.identification.model.bands import Bands, Spread
-from upright.identification.model.fit import Judgement
+from upright.identification.model.fit import Estimate, Judgement
 from upright.identification.model.grey_box import SUBSTEPS
 from upright.physics import PLANTS, Plant, find
 from upright.physics.actuator import ACTUATOR
@@ -126,6 +126,18 @@ class StoredFit:
         status = entry.get("status") if isinstance(entry, dict) else None
         estimated = name in self.content.get("estimated", ())
         return "identified" if estimated else "assumed" if status == "assumed" else "known"
+
+    def estimate(self, name: str) -> Estimate:
+        """A parameter with its interval, as far as the file tells; one without is exact."""
+        entry: Any = self.content["parameters"].get(name)
+        table: Mapping[str, Any] = entry if isinstance(entry, dict) else {}
+        value, error = self.values[name], table.get("stderr", 0.0)
+        low, high = table.get("interval") or (value, value)
+        return Estimate(
+            value=value, stderr=math.inf if error is None else float(error), unit=self.unit(name),
+            interval=(-math.inf if low is None else float(low), math.inf if high is None else float(high)),
+            status=str(table.get("status") or "known"),
+        )  # fmt: skip
 
     @property
     def scores(self) -> dict[str, dict[str, float]]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput, nearest
 from upright.shown import Shown
 from upright.systems.discretization import Matrices, held, with_past_commands
+from upright.systems.motion import march
 
 Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -186,6 +187,32 @@ class StateSpace(Shown):
             self.D
         )
 
+    def step(self, seconds: float, *, command: str | int = 0, samples: int = 1001) -> tuple[Array, Array]:
+        """Times (T,) [s] and outputs (T, p) from rest after a unit step of one command.
+
+        Parameters
+        ----------
+        seconds : float
+            How long.
+        command : str or int
+            Which one steps.
+        samples : int
+            Of a continuous model, evenly over these seconds, exact at each; a sampled one has its own.
+
+        Raises
+        ------
+        BadInput
+            When there is no such command, or no time passes.
+        """
+        if not (math.isfinite(seconds) and seconds > 0 and samples > 1):
+            raise BadInput(f"a step response takes more than 0 s and one sample, got {seconds!r:.20} s.")
+        sampled = self.to_sampled(seconds / (samples - 1)) if self.dt is None else self
+        (j,) = _chosen(command, self.inputs, "input")[:1]
+        u = np.zeros((math.floor(seconds / sampled.period * (1 + 1e-12)) + 1, len(self.inputs)))
+        u[:, j] = 1.0
+        x, u = march(sampled.A, sampled.B, u, np.zeros(len(sampled.A)))
+        return sampled.period * np.arange(len(x), dtype=np.float64), x @ sampled.C.T + u @ sampled.D.T
+
     def to_sampled(self, period: float, delay: float = 0.0, lag: float = 0.0, *, method: str = "zoh") -> StateSpace:
         """The model at its samples, exactly; see `held`.
 
@@ -273,6 +300,8 @@ class StateSpace(Shown):
         """
         if isinstance(model, cls):
             return model
+        if hasattr(model, "reference_names"):
+            raise BadInput("a linear model of what is controlled is needed, and this is a law.")
         if hasattr(model, "num") and hasattr(model, "den"):
             model = _realised(model)
         if hasattr(model, "A") and hasattr(model, "B"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,12 @@ from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
 from upright.records import Provenance, Record
 from upright.verbs.linear.feedback import Gains
+from upright.verbs.linear.matrices import is_linear, linear_model
+from upright.verbs.linear.motion import motion_of_linear
 
 if TYPE_CHECKING:
     from upright.rig import Rig
+    from upright.systems import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -32,8 +36,9 @@ def simulate(
 
     Parameters
     ----------
-    plant : Plant, Rig or fit
+    plant : Plant, Rig, fit, study, path of either, or linear model
         Of a rig or a fit its drive, encoders and servo period count as well, where they are known and not given here.
+        A linear model in any form, ``(A, B)`` too, runs under gains, a deviation from the point that it holds about.
     law : Gains, array of gains, Law or Rule, optional
         Gains act on readings sampled every `dt`, less the equilibrium, and on their differences; an array gives the
         plant's force, of a rig or a fit its command.
@@ -70,8 +75,13 @@ def simulate(
     from upright.simulation import simulate as motion
     from upright.verbs.values import si
 
+    if is_linear(plant):
+        others = {"at": at, "counts": counts, "memory": memory or None, "actuator": actuator}
+        for name in [n for n, value in others.items() if value is not None]:
+            raise BadInput(f"{name} belongs to a rig, and this is a linear model; leave it out.")
+        return _of_linear(linear_model(plant), law, {} if start is None else start, si(seconds, "s"), u, dt, limit)
     rig = _rig(plant)
-    plant = _plant(plant)
+    plant = _plant(plant if rig is None else rig)
     point = _point(plant, law, at)
     if dt is None and rig is not None:
         dt = getattr(law, "period", None) or rig.hardware.value("servo_period", 0.0) or None
@@ -79,8 +89,7 @@ def simulate(
     names = plant.state_names()
     units = [unit for c in plant.coordinates for unit in (c.unit, f"{c.unit}/s")]
     x0 = _start(names, units, point, {} if start is None else start)
-    if not (seconds > 0 and dt > 0 and seconds / dt < 1e8):
-        raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
+    _check_times(seconds, dt)
     samples = round(seconds / dt) + 1
     t = np.arange(samples, dtype=np.float64) * dt
     if actuator is not None and not isinstance(actuator, Mapping):  # type: ignore[reportUnnecessaryIsInstance]
@@ -123,6 +132,32 @@ def simulate(
     )  # fmt: skip
 
 
+def _of_linear(
+    model: StateSpace, law: Any, start: Any, seconds: float, u: Any, dt: float | str | None, limit: float | str | None
+) -> Record:  # fmt: skip
+    """Motion of a linear model, a deviation from its point."""
+    from upright.verbs.values import si
+
+    requested = None if dt is None else si(dt, "s")
+    if model.dt is not None and requested is not None and not math.isclose(requested, model.dt, rel_tol=1e-9):
+        raise BadInput(f"this model is sampled every {1e3 * model.dt:.6g} ms, so leave dt out.")
+    every = _period(law, requested or model.dt)
+    _check_times(seconds, every)
+    if seconds < every:
+        raise BadInput(f"simulate needs a sample at least, {1e3 * every:.6g} ms, got {seconds:g} s.")
+    largest = math.inf if limit is None else si(limit, model.unit or "1")
+    if not largest > 0:
+        raise BadInput(f"simulate needs a limit above 0, got {largest:g}.")
+    t = np.arange(round(seconds / every) + 1, dtype=np.float64) * every
+    x0 = _start(model.states, [model.units.get(n, "1") for n in model.states], {}, start)
+    return motion_of_linear(model, law, x0, _command(u, t, len(model.inputs)), t, largest)
+
+
+def _check_times(seconds: float, dt: float) -> None:
+    if not (seconds > 0 and dt > 0 and seconds / dt < 1e8):
+        raise BadInput(f"simulate needs seconds and dt above 0, got seconds={seconds:g} and dt={dt:g}.")
+
+
 def _check_gains(rig: Rig, K: Array, point: Mapping[str, float]) -> None:
     """Refuse an array that stabilises the plant by a force and not the rig by its command."""
     at = min(rig.plant.equilibria, key=lambda name: _apart(rig.plant.equilibrium(name), point))
@@ -152,11 +187,12 @@ def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
 def _rig(source: Any) -> Rig | None:
     """A rig, or that of a fit; a plant alone has no drive."""
     from upright.rig import Rig
+    from upright.study.load import Study
+    from upright.verbs.handover import rig_of
     from upright.verbs.model.fit import FitAnswer
 
-    if isinstance(source, Rig):
-        return source
-    return source.rig if isinstance(source, FitAnswer) else None
+    stored = isinstance(source, FitAnswer | Study | str | os.PathLike)
+    return source if isinstance(source, Rig) else rig_of(source, "simulate", draws=0) if stored else None
 
 
 def _plant(source: Any) -> Plant:

@@ -1,10 +1,12 @@
 """The prediction without physics that a model is compared with: exact where the truth is a difference equation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from upright.identification.inference.black_box import Paced, _percents, _sampled, black_box
+from upright.identification.inference.black_box import Paced, _percents, _sampled, black_box, black_box_run
 from upright.identification.model.runs import Run
 
 DT = 0.01
@@ -106,3 +108,16 @@ def test_windows_laid_end_to_end_count_all_their_steps_and_without_them_the_whol
     assert _percents(still, 1, paced, None) == {0: pytest.approx(left(y[1:, 0], np.zeros(11)))}
     assert _percents(still, 1, paced, 3, 12.0) == {}
     assert _percents(still, 1, paced, 12) == {0: -1000.0}  # no window fits
+
+
+def test_an_equation_that_is_linear_is_predicted_exactly_from_what_was_seen():
+    """A damped oscillation under a held command obeys a difference equation of second order exactly."""
+    t = np.arange(0, 20, 0.05)
+    y = np.exp(-0.2 * t) * np.cos(3 * t) + 0.1
+    run = Run(label="swing", role="predict", t=t, u=np.zeros((t.size, 1)), y=y[:, None], measured=("theta",))
+    seen = run.samples(slice(0, 200))
+    rest = replace(run.samples(slice(150, None)), score_from=t[200] - t[150])
+    score = black_box_run(seen, rest, period=2 * np.pi / 3)
+    np.testing.assert_allclose(score.simulated, score.y, atol=1e-8)
+    assert score.t[0] > t[200]
+    assert score.fit_percent["theta"] == pytest.approx(100, abs=1e-4)

@@ -14,7 +14,7 @@ from upright.errors import BadInput
 from upright.identification import Run, RunScore
 from upright.identification.estimate import identify
 from upright.identification.ladder.cross_validation import HeldOut, cross_validate, leave_one_out
-from upright.identification.ladder.decision import by_chance, compare, gain_scatter
+from upright.identification.ladder.decision import by_chance, compare_rungs, gain_scatter
 from upright.identification.ladder.repeats import repeats, same
 from upright.physics import Furuta, Pendulum
 
@@ -121,17 +121,17 @@ def test_half_the_error_is_a_gain_of_log_2_without_scatter(runs):
     generator = np.random.default_rng(1)
     y, e = generator.normal(size=(2, 1000))
     poorer = [scored(y, e) for _ in range(runs)]
-    found = compare(poorer, [scored(y, e / 2) for _ in range(runs)], [np.zeros(1)] * runs)
+    found = compare_rungs(poorer, [scored(y, e / 2) for _ in range(runs)], [np.zeros(1)] * runs)
     assert found.gain == pytest.approx(math.log(2), rel=1e-9)
     assert found.scatter < 1e-9
     assert found.better
-    assert not compare(poorer, poorer, [np.zeros(1)] * runs).better
+    assert not compare_rungs(poorer, poorer, [np.zeros(1)] * runs).better
 
 
 def test_an_error_below_rounding_is_no_error():
     y, e = np.random.default_rng(2).normal(size=(2, 1000))
     tiny = [scored(y, 1e-6 * e)]
-    found = compare(tiny, [scored(y, 1e-7 * e)], [np.full(1, 1e-2)])
+    found = compare_rungs(tiny, [scored(y, 1e-7 * e)], [np.full(1, 1e-2)])
     assert found.gain == pytest.approx(0.0, abs=1e-6)
 
 

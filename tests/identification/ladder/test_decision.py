@@ -10,7 +10,7 @@ import pytest
 
 from tests.identification.twins import swing
 from upright.identification import RunScore
-from upright.identification.ladder.decision import Comparison, compare, reason
+from upright.identification.ladder.decision import RungComparison, compare_rungs, reason
 from upright.identification.ladder.repeats import Repeats, at_ceiling, log_error, same
 
 N, DT = 1200, 0.01
@@ -27,8 +27,10 @@ def scored(missed: np.ndarray, *, score_from: float = 0.0, **percent: float) -> 
                  t=5.0 + np.arange(N) * DT, simulated=y - missed, measured=names, score_from=score_from)  # fmt: skip
 
 
-def gain(poorer: np.ndarray, richer: np.ndarray, resolution: float = 0.0, runs: int = 3, **more: float) -> Comparison:
-    return compare(*([scored(m, **more)] * runs for m in (poorer, richer)), [np.full(2, resolution)] * runs)
+def gain(
+    poorer: np.ndarray, richer: np.ndarray, resolution: float = 0.0, runs: int = 3, **more: float
+) -> RungComparison:
+    return compare_rungs(*([scored(m, **more)] * runs for m in (poorer, richer)), [np.full(2, resolution)] * runs)
 
 
 @pytest.mark.parametrize("runs", [1, 2, 3])
@@ -58,7 +60,7 @@ def test_signals_count_alike_and_held_ones_do_not() -> None:
         assert gain(poorer, richer, runs=runs).gain == pytest.approx(1.5 * math.log(2))
         assert gain(poorer, richer, runs=runs, q_1=0.0).gain == pytest.approx(2 * math.log(2))
     still = replace(scored(np.ones(N)), y=np.zeros((N, 1)))
-    assert compare([still] * 3, [scored(np.ones(N))] * 3, [np.zeros(1)] * 3).gain == 0.0
+    assert compare_rungs([still] * 3, [scored(np.ones(N))] * 3, [np.zeros(1)] * 3).gain == 0.0
 
 
 @pytest.mark.parametrize(("period", "pieces"), [(0.1, 12), (2.0, 7), (12.0, 4)])
@@ -69,14 +71,14 @@ def test_stretches_are_four_memories_long_and_four_to_twelve(period: float, piec
 
 
 def test_a_gain_of_one_standard_error_is_not_enough() -> None:
-    about = Comparison(gain=0.1, scatter=0.1, pairs=3, between="runs")
+    about = RungComparison(gain=0.1, scatter=0.1, pairs=3, between="runs")
     assert not about.better
     assert replace(about, gain=0.1001).better
 
 
 def test_the_sentence_gives_the_change_and_its_scatter_in_percent() -> None:
     """exp(-ln 2) - 1 = -50 %; exp(-ln 2 - 0.1) - 1 = -54.8 %; exp(-ln 2 + 0.1) - 1 = -44.7 %."""
-    half = Comparison(gain=math.log(2), scatter=0.1, pairs=7, between="runs")
+    half = RungComparison(gain=math.log(2), scatter=0.1, pairs=7, between="runs")
     assert "by −50.0 % (−54.8 to −44.7 % within one standard error over 7 runs)" in half.sentence()
     worse = replace(half, gain=-math.log(2), scatter=0.0)
     assert "by +100.0 % (+100.0 to +100.0 %" in worse.sentence()
@@ -85,7 +87,7 @@ def test_the_sentence_gives_the_change_and_its_scatter_in_percent() -> None:
 
 
 def test_the_reason_says_what_was_decided_and_why() -> None:
-    worse = Comparison(gain=-0.1, scatter=0.1, pairs=7, between="runs")
+    worse = RungComparison(gain=-0.1, scatter=0.1, pairs=7, between="runs")
     better = replace(worse, gain=0.3)
     assert reason(None, 1.0, math.inf).startswith("The first rung")
     assert reason(better, 0.5, 1.0).startswith("Kept: ")

@@ -349,7 +349,16 @@ def test_a_model_that_nothing_tests_is_to_be_tested(changed, runs, more, told):
 @pytest.mark.parametrize(("value", "worse"), [(-0.1, True), (0.0, False)])
 def test_a_signal_is_worse_than_its_mean_below_zero_percent(changed, value, worse):
     steps = said(changed(runs={"a": score(fit_percent={"theta": value})}))
-    assert any("θ of run 'a' is explained worse than by its mean" in s for s in steps) == worse
+    assert any("θ is explained worse than by its mean ('a'" in s for s in steps) == worse
+
+
+def test_a_reversed_sign_is_named_where_the_percent_is_that_of_one(changed):
+    """Of y about zero, -y explains 100 (1 - |y + y| / |y|) = -100 %; what is missed by more has another cause."""
+    runs = {"a": score(fit_percent={"theta": -100.0}), "b": score(fit_percent={"theta": -90.0})}
+    (one,) = (s for s in said(changed(runs=runs)) if "worse than by its mean" in s)
+    assert "('a' −100.0 %, 'b' −90.0 %), as by a reversed sign" in one
+    (other,) = (s for s in said(changed(runs=runs | {"b": score(fit_percent={"theta": -400.0})})) if "worse than" in s)
+    assert "look at the plant and at the units" in other
 
 
 @pytest.mark.parametrize(("percents", "lost"), [((79.9, 99.0), True), ((80.0, 99.0), False)])

@@ -13,6 +13,7 @@ from upright.report.fit.chapter import motion_part, rest_picture, run_pictures
 from upright.report.fit.figures import directions_figure, fit_figure, interval_figure
 from upright.report.fit.tables import finding, parameter_table, score_table
 from upright.report.page import Block, Chapter, Part, Picture, Step, Symbol, Table
+from upright.report.rig import rig_drawing
 from upright.report.symbols import number, percent, typed, unit
 
 QUESTION = (
@@ -44,6 +45,7 @@ def chapter(result: FreeSwing) -> Chapter:
     return Chapter(
         key="4",
         title="Large free swing",
+        drawing=rig_drawing(result.rig.plant),
         question=QUESTION.format(body=result.body),
         verdict=_verdict(result),
         detail=_detail(result),
@@ -160,7 +162,7 @@ def _blind_part(blind: Fit) -> Part:
                 description="; ".join(blind.unseen),
             )
         )  # fmt: skip
-    return Part("What the data cannot see", tuple(blocks))
+    return Part("What the data cannot see", tuple(blocks), folded=True)
 
 
 def _energy_part(b: EnergyBalance) -> Part:
@@ -170,7 +172,7 @@ def _energy_part(b: EnergyBalance) -> Part:
         name="energy", draw=lambda: energy_figure(b.t, b.stored, b.dissipated), description=f"At the end: {ends}.",
         caption="Where the energy of the release went, as the fitted model tells it.",
     )  # fmt: skip
-    return Part("Where the energy went", (shown,))
+    return Part("Where the energy went", (shown,), folded=True)
 
 
 def _drift_part(result: FreeSwing) -> Part:
@@ -230,7 +232,7 @@ def _level_part(result: FreeSwing) -> Part:
         "and with the spring on."
     )
     verdicts = (f"{a.question.title}: {a.fit.verdict}" for a in answers)
-    return Part("Is the rig level?", (reason, *verdicts, table, *pictures))
+    return Part("Is the rig level?", (reason, *verdicts, table, *pictures), folded=True)
 
 
 def _worst(fit: Fit, role: str, name: str) -> float:

@@ -19,6 +19,7 @@ from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate
 from upright.report.fit.tables import finding, parameter_table, plain_estimate, pole_table
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
+from upright.report.rig import rig_drawing
 from upright.report.symbols import number, typed, unit
 
 QUESTION = (
@@ -42,6 +43,8 @@ def chapter(result: FrequencyRun) -> Chapter:
     upright = "inverted" in result.rig.plant.equilibria
     return Chapter(
         key="1b",
+        best="bode",
+        drawing=rig_drawing(result.rig.plant),
         title="Frequency response of the hanging rig" if upright else "Frequency response",
         question=QUESTION,
         verdict=answer.fit.verdict,
@@ -49,7 +52,7 @@ def chapter(result: FrequencyRun) -> Chapter:
         f"interval. {_simplex_sentence(answer)}",
         sound=answer.fit.trusted,
         parts=(
-            Part("Excitation", (*_campaign(result), _quality_picture(answer.data))),
+            Part("Excitation", (*_campaign(result), _quality_picture(answer.data)), folded=True),
             *_answer_parts(answer, truth=result.truth, known=_bench(result)),
         ),
         steps=_steps(result),

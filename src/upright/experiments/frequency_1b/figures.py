@@ -93,7 +93,7 @@ def _residuals(upper: Any, lower: Any, answer: FrequencyFit, j: int, *, first: b
         axes.set_ylim(*(f * max(0.15, float(np.max(np.abs(axes.get_ylim())))) for f in (-1.6, 1.6)))
         _decades(axes)
         if first:
-            axes.set_ylabel(label, fontsize=8)
+            axes.set_ylabel(label, fontsize=8.5)
 
 
 def _decades(axes: Any) -> None:
@@ -165,7 +165,7 @@ def quality_figure(data: FrequencyResponse) -> Figure:
     panels[0, 0].legend(loc="best")
     panels[1, 1].plot(data.omega, np.abs(data.drive), "x", color=BLACK, markersize=4,
                       label=f"command [{unit(data.units[-1])}]" if unit(data.units[-1]) else "command")  # fmt: skip
-    panels[1, 1].legend(loc="best", fontsize=7.5)
+    panels[1, 1].legend(loc="best", fontsize=8.5)
     _whole_decades(panels[1, 1])
     for axes in panels[1]:
         _frequencies(axes, data)

@@ -14,8 +14,8 @@ from upright.designing.run import Designed, DesignRequest, design_for
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import DRAWS, SETS, Attempt, Regulation, VelocityRun
 from upright.gains.requests import written
-from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
-from upright.report.rig import rig_table
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table
+from upright.report.rig import of_rig, rig_table
 from upright.report.symbols import number, plain
 from upright.rig import Rig
 
@@ -29,6 +29,7 @@ def chapter(result: Regulation) -> Chapter:
     """What holding the rig upright came to."""
     page = Chapter(
         key="2",
+        best="regulation-runs0",
         title="Holding it upright",
         question="Which of the pole sets hold the rig upright within its drive's limit, and can that be predicted "
         "before anything moves, from the numbers identified while it hung?",
@@ -48,7 +49,7 @@ def chapter(result: Regulation) -> Chapter:
         ),
         numbers=_numbers(result),
     )  # fmt: skip
-    return resting_on(page, result.rig.basis, result.performed)
+    return of_rig(page, result.rig, result.performed)
 
 
 def _verdict(result: Regulation) -> str:
@@ -326,7 +327,7 @@ def _parts(result: Regulation) -> list[Part]:
             description="Changes of the command from sample to sample: "
             + ", ".join(f"{w.name} {number(w.restless, 2)} {rig.unit}" for w in result.ways) + ".",
         )  # fmt: skip
-        parts.append(Part("Velocities", (_way_table(result), ways)))
+        parts.append(Part("Velocities", (_way_table(result), ways), folded=True))
     return parts
 
 

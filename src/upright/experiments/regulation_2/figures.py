@@ -64,7 +64,7 @@ def runs_figure(attempts: Sequence[Attempt], seconds: float) -> Figure:
             _ends(axes[row], first.rig.travel * (180 / math.pi if turned else 100.0))
     axes[-1, 0].set_ylabel(axis("command", first.rig.unit))
     axes[-1, 0].text(
-        0.98 * seconds, first.rig.limit, "limit", ha="right", va="bottom", fontsize=7.5, color=GREY
+        0.98 * seconds, first.rig.limit, "limit", ha="right", va="bottom", fontsize=8.5, color=GREY
     )  # fmt: skip
     low, high = axes[-1, 0].get_ylim()
     axes[-1, 0].set_ylim(low * 1.15, high * 1.15)
@@ -81,7 +81,7 @@ def _ends(row: Any, travel: float) -> None:
             if shown > 0.8 * travel:
                 ax.axhline(side * travel, color=GREY, linestyle=":", linewidth=1.0)
     if shown > 0.8 * travel:
-        row[0].text(0.0, travel, "end of travel", va="bottom", fontsize=7.5, color=GREY)
+        row[0].text(0.0, travel, "end of travel", va="bottom", fontsize=8.5, color=GREY)
 
 
 @styled

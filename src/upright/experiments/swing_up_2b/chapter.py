@@ -10,7 +10,8 @@ from upright.control.swing_up import Ascent
 from upright.experiments.swing_up_2b.figures import ascent_figure, check_figure, portrait_figure
 from upright.experiments.swing_up_2b.run import FAULTS, HELD, TILT, FaultyEncoder, SwingUpRun
 from upright.laws import as_values
-from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table, resting_on
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Table
+from upright.report.rig import of_rig
 from upright.report.symbols import number, percent
 from upright.report.symbols import unit as raised
 from upright.rig import Rig
@@ -38,7 +39,7 @@ def chapter(result: SwingUpRun, folder: str = "FOLDER") -> Chapter:
         sound=result.sound, parts=tuple(parts), steps=_steps(result, folder), findings=_findings(result),
         numbers=_numbers(result),
     )  # fmt: skip
-    return resting_on(page, result.model.basis, result.performed)
+    return of_rig(page, result.model, result.performed)
 
 
 def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json") -> Chapter:
@@ -51,7 +52,7 @@ def check_chapter(model: Rig, check: Scales, log: str, source: str = "FIT.json")
         verdict=check.verdict, sound=check.sound, parts=(_sensor_part(model, check),),
         steps=(onward if check.sound else again,), numbers={"sensors": _scales(check), "verdict": check.verdict},
     )  # fmt: skip
-    return resting_on(page, model.basis)
+    return of_rig(page, model)
 
 
 def _scales(check: Scales) -> dict[str, Any]:

@@ -43,15 +43,15 @@ def ascent_figure(run: Ascent, *, after: float = 2.5) -> Figure:
     for turn in np.arange(np.floor(degrees.min() / 360), np.ceil(degrees.max() / 360) + 1) * 360 + 180:
         if degrees.min() - 40 < turn < degrees.max() + 40:
             axes[0].axhline(turn, color=GREY, linestyle="--", linewidth=0.9)
-            axes[0].text(0.0, turn, " upright", ha="left", va="bottom", fontsize=7.5, color=GREY)
+            axes[0].text(0.0, turn, " upright", ha="left", va="bottom", fontsize=8.5, color=GREY)
     axes[0].margins(y=0.1)
     axes[0].set_ylabel("angle θ [°]")
     low = 2 * run.law.body.weight
     axes[1].plot(*decimated(t, 1e3 * run.energy[shown]), color=GREEN)
     axes[1].axhline(0.0, color=GREY, linestyle="--", linewidth=0.9)
-    axes[1].text(last, 0.0, "upright at rest ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+    axes[1].text(last, 0.0, "upright at rest ", ha="right", va="bottom", fontsize=8.5, color=GREY)
     axes[1].axhline(-1e3 * low, color=GREY, linestyle=":", linewidth=0.9)
-    axes[1].text(last, -1e3 * low, "hanging at rest ", ha="right", va="bottom", fontsize=7.5, color=GREY)
+    axes[1].text(last, -1e3 * low, "hanging at rest ", ha="right", va="bottom", fontsize=8.5, color=GREY)
     axes[1].set_ylabel("energy [mJ]")
     axes[2].plot(*decimated(t, trial.u[shown]), color=VERMILLION, linewidth=0.9)
     _limits(axes[2], rig.limit, float(np.abs(trial.u[shown]).max()), "limit", last)
@@ -73,7 +73,7 @@ def _limits(ax: Any, limit: float, most: float, name: str, where: float) -> None
         draw_limits(ax, limit, name, where)
         ax.set_ylim(-1.3 * limit, 1.3 * limit)
     else:
-        ax.text(0.995, 0.97, f"{name} ±{limit:.3g}", ha="right", va="top", fontsize=7.5, color=GREY,
+        ax.text(0.995, 0.97, f"{name} ±{limit:.3g}", ha="right", va="top", fontsize=8.5, color=GREY,
                 transform=ax.transAxes)  # fmt: skip
 
 

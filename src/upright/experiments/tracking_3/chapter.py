@@ -26,7 +26,8 @@ from upright.identification.model.fit import Fit
 from upright.paper.reproduce import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
 from upright.report.fit.tables import finding, parameter_table
-from upright.report.page import Chapter, KeyNumber, Part, Picture, Step, Table, resting_on
+from upright.report.page import Chapter, KeyNumber, Part, Picture, Step, Table
+from upright.report.rig import of_rig
 from upright.report.symbols import number, plain, typed
 
 
@@ -46,13 +47,13 @@ def chapter(result: Tracking) -> Chapter:
         if left:
             detail = f"Tried on the rig, but for what is predicted to leave the bounds: {', '.join(left)}."
     page = Chapter(
-        key="3", title="Tracking through a flexible shaft",
+        key="3", best="track-steps", title="Tracking through a flexible shaft",
         question=f"Can the drive at one end of a flexible shaft make the other end, {far}, follow a step, within its "
         "effort and the shaft's travel, and what does it take beyond PD control of its own end?",
         verdict=_verdict(result), detail=detail + ended, sound=_sound(result), parts=tuple(parts), steps=_steps(result),
         findings=_findings(result), numbers=_numbers(result),
     )  # fmt: skip
-    return resting_on(page, result.model.basis, result.performed if result.tried else SIMULATED)
+    return of_rig(page, result.model, result.performed if result.tried else SIMULATED)
 
 
 def _verdict(result: Tracking) -> str:
@@ -160,7 +161,7 @@ def _data(result: Tracking) -> list[Part]:
     sentence = f"{fit.verdict} Other pulses are predicted: {scores}."
     scale = _scale(fit.model.parameters["actuator.gain"].estimate)
     return [
-        Part("Data", (pulses, *run_pictures(fit, "track"))),
+        Part("Data", (pulses, *run_pictures(fit, "track")), folded=True),
         motion_part(fit),
         Part("Fit", (sentence, scale, _fit_table(result, fit))),
     ]

@@ -73,7 +73,7 @@ def steps_figure(
     if until > DWELL:
         for ax in axes:
             ax.axvline(DWELL, color=GREY, linewidth=0.8, linestyle="-.")
-        axes[0].text(DWELL, 0.97 * high, " push begins", va="top", fontsize=7.5, color=GREY)
+        axes[0].text(DWELL, 0.97 * high, " push begins", va="top", fontsize=8.5, color=GREY)
     drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=6, columnspacing=1.2)
     axes[-1].set_xlabel("time from the step [s]")
     hide_times = axes[:-1] if kick is None else axes[:-2]

@@ -45,7 +45,7 @@ def chapter(result: Weighing) -> Chapter:
     weighed = {body.inertia: {**plain_estimate(loadings.bare), "unit": body.unit}}
     handed_on = {k.name: {"value": k.value, "stderr": k.stderr} for k in result.known}
     numbers = {**page.numbers, "parameters": weighed, "handed_on": handed_on}
-    return replace(page, key="1a", findings=findings, numbers=numbers)
+    return replace(page, key="1a", best="line", findings=findings, numbers=numbers)
 
 
 def _later_chapter(result: Weighing, make: Make, weighed: Chapter) -> Chapter:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.inference.scoring import fit_percent
+from upright.identification.model.fit import RunScore
 from upright.identification.model.runs import Run
 
 Array = NDArray[np.float64]
@@ -108,24 +109,69 @@ def _percents(
     weights: Array, order: int, s: Paced, ahead: int | None, skip: float = 0.0, *, exactly: bool = False
 ) -> dict[int, float]:
     """Fit percent by output over windows laid end to end, `exactly` so many steps ahead, or from the first samples."""
-    first = (order - 1) * s.stride
-    steps = (len(s.y) - 1 - first) // s.stride if ahead is None else ahead
-    apart = s.stride * (1 if exactly else steps)
-    origins = np.arange(first, len(s.y) - steps * s.stride, apart)
-    if not len(origins):
+    at, measured, predicted = _forecast(weights, order, s, ahead, exactly=exactly)
+    if not at.size:
         return dict.fromkeys(range(s.y.shape[1]), -1000.0)
-    recent = np.array([s.y[origins - i * s.stride] for i in range(order)])
-    measured, predicted = (np.empty((steps, len(origins), s.y.shape[1])) for _ in range(2))
-    with np.errstate(all="ignore"):  # an unstable equation runs away, and its score says so
-        for j in range(steps):
-            at = origins + j * s.stride
-            predicted[j] = _past(s, at, order, recent) @ weights
-            measured[j] = s.y[at + s.stride]
-            recent = np.concatenate([predicted[j][None], recent[:-1]])
-    counted = (origins[None, :] + s.stride * np.arange(1, steps + 1)[:, None]) >= skip
+    counted = at >= skip
     if exactly:
         counted[:-1] = False
     if not counted.any():
         return {}
     with np.errstate(all="ignore"):
         return {k: fit_percent(measured[counted][:, k], predicted[counted][:, k]) for k in range(s.y.shape[1])}
+
+
+def _forecast(
+    weights: Array, order: int, s: Paced, ahead: int | None, *, exactly: bool = False, first: int = 0
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Samples (steps, windows), and what was measured and predicted there (steps, windows, outputs)."""
+    first = max(first, (order - 1) * s.stride)
+    steps = (len(s.y) - 1 - first) // s.stride if ahead is None else ahead
+    apart = s.stride * (1 if exactly else steps)
+    origins = np.arange(first, len(s.y) - steps * s.stride, max(apart, 1))
+    recent = np.array([s.y[origins - i * s.stride] for i in range(order)])
+    at = origins[None, :] + s.stride * np.arange(1, steps + 1)[:, None]
+    measured, predicted = (np.empty((steps, len(origins), s.y.shape[1])) for _ in range(2))
+    with np.errstate(all="ignore"):  # an unstable equation runs away, and its score says so
+        for j in range(steps):
+            predicted[j] = _past(s, at[j] - s.stride, order, recent) @ weights
+            measured[j] = s.y[at[j]]
+            recent = np.concatenate([predicted[j][None], recent[:-1]])
+    return at, measured, predicted
+
+
+def black_box_run(training: Run, run: Run, period: float) -> RunScore | None:
+    """A run as the equation predicts it that was fitted to the `training`; None where there is too little to fit.
+
+    Parameters
+    ----------
+    training : Run
+        With the same signals.
+    run : Run
+        Predicted from its samples before ``score_from`` on, or over its shortest horizon, at the pace of the equation.
+    period : float
+        Of the motion [s].
+    """
+    horizon = next(iter(run.horizons), None)
+    stride = max(1, round(min(period, horizon or period) / STEPS / run.period))
+    known, rest = _sampled(training, stride * run.period), _sampled(run, stride * run.period)
+    ahead = None if horizon is None else max(1, round(horizon / (stride * run.period)))
+    begin = int(np.searchsorted(run.t, run.t[0] + run.score_from - 1e-9))
+    if known is None or rest is None:
+        return None
+    candidates: list[tuple[float, int, Array]] = []
+    for order in ORDERS:
+        if len(known.y) > 4 * order * stride and begin >= (order - 1) * stride and len(run.t) - begin > 2 * stride:
+            weights = _fit([known], order)
+            within = float(np.mean([*_percents(weights, order, known, ahead).values()]))
+            candidates.append((within, order, weights))
+    if not candidates:
+        return None
+    _, order, weights = max(candidates, key=lambda c: c[0])
+    at, measured, predicted = _forecast(weights, order, rest, ahead, first=begin)
+    y, simulated = (np.moveaxis(a, 1, 0).reshape(-1, rest.y.shape[1]) for a in (measured, predicted))
+    names = tuple(run.measured[k] for k in run.free)
+    return RunScore(
+        role="predict", fit_percent={n: fit_percent(y[:, k], simulated[:, k]) for k, n in enumerate(names)},
+        horizon=horizon, t=run.t[at.T.reshape(-1)], y=y, simulated=simulated, measured=names,
+    )  # fmt: skip

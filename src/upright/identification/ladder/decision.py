@@ -37,7 +37,7 @@ LOST = 11.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class RungComparison:
     """Held-out improvement of one model over another.
 
     `gain` is the mean decrease of the logarithm of the error, positive when the richer model predicts better, `scatter`
@@ -68,7 +68,7 @@ class Comparison:
         )
 
 
-def compare(poorer: Sequence[RunScore], richer: Sequence[RunScore], quanta: Sequence[Array]) -> Comparison:
+def compare_rungs(poorer: Sequence[RunScore], richer: Sequence[RunScore], quanta: Sequence[Array]) -> RungComparison:
     """Compare two models on what neither has seen.
 
     Parameters
@@ -84,7 +84,7 @@ def compare(poorer: Sequence[RunScore], richer: Sequence[RunScore], quanta: Sequ
     else:
         gains = np.concatenate([_stretch_gains(a, b, q) for a, b, q in zip(poorer, richer, quanta, strict=True)])
         between = "stretches"
-    return Comparison(gain=float(gains.mean()), scatter=gain_scatter(gains), pairs=gains.size, between=between)
+    return RungComparison(gain=float(gains.mean()), scatter=gain_scatter(gains), pairs=gains.size, between=between)
 
 
 def by_chance(terms: int, noise: float) -> float:
@@ -151,7 +151,7 @@ def _stretch_gains(poorer: RunScore, richer: RunScore, quanta: Array) -> Array:
     return np.array([[_signal_gain(poorer, richer, k, cut, quanta[k]) for k in free] for cut in cuts]).mean(axis=1)
 
 
-def reason(comparison: Comparison | None, cost: float, before: float, *, lucky: bool = False) -> str:
+def reason(comparison: RungComparison | None, cost: float, before: float, *, lucky: bool = False) -> str:
     """Why a rung is kept or refused, in a sentence; `cost` and `before` are of its fit and the poorer one's.
 
     A `lucky` fit is no closer than numbers that mean nothing would make it.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput
 from upright.identification.inference.scoring import score_run
 from upright.identification.ladder.cross_validation import leave_one_out
-from upright.identification.ladder.decision import Comparison, by_chance, compare, reason, stalled
+from upright.identification.ladder.decision import RungComparison, by_chance, compare_rungs, reason, stalled
 from upright.identification.ladder.repeats import Repeats, at_ceiling, repeats
 from upright.identification.ladder.rungs import Rung, check_rungs, default_rungs, friction_rungs, rig_at, runs_at
 from upright.identification.model.fit import RunScore
@@ -75,7 +75,7 @@ class RungResult:
     per_run: int
     values: Mapping[str, float]
     seconds: float
-    comparison: Comparison | None = None
+    comparison: RungComparison | None = None
 
     @property
     def fit_percent(self) -> float:
@@ -123,10 +123,10 @@ def climb(
     """Grow a model rung by rung, while what was held out is predicted better by more than chance.
 
     Every rung is fitted to all runs from where the best rung below ended, then each run is predicted from a fit of the
-    others; of a single run the last third is predicted from the first two. `decision.compare` says what better means:
-    the mean paired decrease of the logarithm of the error exceeds one standard error of it. A rung that is refused is
-    taken off again before the next one is tried, and tried once more when another was kept after it: dry friction may
-    say nothing while a lag is missing.
+    others; of a single run the last third is predicted from the first two. `decision.compare_rungs` says what better
+    means: the mean paired decrease of the logarithm of the error exceeds one standard error of it. A rung that is
+    refused is taken off again before the next one is tried, and tried once more when another was kept after it: dry
+    friction may say nothing while a lag is missing.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ class _Climb:
         comparison = None
         if self.scores:
             poorer, richer = ([scores[run.label] for run in runs] for scores in (self.scores, predicted))
-            comparison = compare(poorer, richer, [np.array(run.quanta) for run in runs])
+            comparison = compare_rungs(poorer, richer, [np.array(run.quanta) for run in runs])
         better = comparison is None or (comparison.better and not lucky)
         values, shared = problem.values_at(end.x), problem.shared_at(end.x)
         self.steps.append(

@@ -135,7 +135,7 @@ def log_error(percent: float) -> float:
 def at_ceiling(groups: Sequence[Repeats], scores: Mapping[str, RunScore]) -> bool:
     """Whether runs predict one another no better than a model predicts them, by more than one standard error.
 
-    The same rule by which `decision.compare` keeps a richer model, a repeat being the richest of all.
+    The same rule by which `decision.compare_rungs` keeps a richer model, a repeat being the richest of all.
     """
     gains = [
         float(np.mean([log_error(p) for p in scores[label].fit_percent.values()])) - error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -70,8 +70,6 @@ def chapter(
 
     Parameters
     ----------
-    fit : Fit
-    title : str
     provenance : mapping, optional
         Where the data came from: file, window, hash by run; texts, lists or further mappings.
     study, folder : str
@@ -407,15 +405,12 @@ def fit_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cross
 def _broken(fit: Fit) -> Iterator[Step]:
     if fit.interrupted:
         yield Step("The search was stopped; these are its best values so far. Run it to its end.")
-    for label, score in fit.runs.items():
-        for name, value in score.fit_percent.items():
-            if value < 0:
-                yield Step(
-                    f"{plain(name)} of run '{label}' is explained worse than by its mean ({percent(value)}): look at "
-                    "the sign and scale of the column first; a reversed sign scores about −100 %. Where the study "
-                    "says sign = -1 already, take that out.",
-                    f"[sensors.{name}]\nsign = -1",
-                )
+    for name in dict.fromkeys(n for s in fit.runs.values() for n in s.fit_percent):
+        missed = {label: s.fit_percent[name] for label, s in fit.runs.items() if s.fit_percent.get(name, 0.0) < 0}
+        if missed:
+            runs = ", ".join(f"'{label}' {percent(value)}" for label, value in missed.items())
+            yield Step(f"{plain(name)} is explained worse than by its mean ({runs}){_so_far_off(missed.values())}",
+                       f"[sensors.{name}]\nsign = -1")  # fmt: skip
     lost = [
         label
         for label, s in fit.runs.items()
@@ -434,6 +429,17 @@ def _broken(fit: Fit) -> Iterator[Step]:
     for name in stopped:
         if name not in none:
             yield Step(f"{name} stopped at its bound; widen the bound or give its value as known.")
+
+
+REVERSED = (-160.0, -40.0)
+"""Fit percents about -100: of a signal that is the measured one with the other sign, somewhat off."""
+
+
+def _so_far_off(missed: Collection[float]) -> str:
+    """What may be wrong with a signal that is explained worse than by its mean."""
+    if all(REVERSED[0] < value < REVERSED[1] for value in missed):
+        return ", as by a reversed sign. Where the study says sign = -1 already, take that out."
+    return ": look at the plant and at the units of its columns first, then at the sign."
 
 
 def _blind(fit: Fit) -> Iterator[Step]:

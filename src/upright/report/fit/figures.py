@@ -102,7 +102,7 @@ def _signal(upper: Axes, lower: Axes, score: RunScore, j: int, unit: str, bucket
     upper.set_ylabel(axis(plain(score.measured[j]), unit))
     lower.axhline(0, color=GREY, linewidth=0.6)
     lower.plot(*decimated(t, left, buckets), color=VERMILLION, linewidth=0.7)
-    lower.set_ylabel("residual", fontsize=8)
+    lower.set_ylabel("residual", fontsize=8.5)
     if score.score_from > 0:
         for panel, label in ((upper, "not scored"), (lower, None)):
             panel.axvspan(t[0], t[0] + score.score_from, color=GREY, alpha=0.25, linewidth=0, label=label)
@@ -229,7 +229,7 @@ def correlation_figure(fit: Fit) -> Figure:
             r = float(fit.correlation[i, j])
             strong = abs(r) > 0.9 and i != j
             ax.text(
-                j, i, _correlation(r), ha="center", va="center", fontsize=7.5, weight="bold" if strong else "normal"
+                j, i, _correlation(r), ha="center", va="center", fontsize=8.5, weight="bold" if strong else "normal"
             )
     names = [mathtext(name) for name in fit.names]
     ax.set_xticks(range(n), names, rotation=45 if n > 7 else 0, ha="right" if n > 7 else "center")
@@ -264,7 +264,7 @@ def directions_figure(fit: Fit) -> Figure:
     shares = fit.directions[:n]
     _cells(mix, shares)
     for i, j in zip(*np.nonzero(np.abs(shares) >= 0.1), strict=True):
-        mix.text(j, i, _correlation(float(shares[i, j])), ha="center", va="center", fontsize=7)
+        mix.text(j, i, _correlation(float(shares[i, j])), ha="center", va="center", fontsize=8.5)
     mix.set_xticks(range(len(fit.names)), [mathtext(name) for name in fit.names], rotation=45, ha="right")
     mix.set_title("… of this combination")
     mix.grid(visible=False)
@@ -282,7 +282,7 @@ def _bars(ax: Axes, fit: Fit) -> None:
     ax.plot(np.maximum(values, floor), range(values.size), "o", color=BLUE, markersize=4)
     for i, v in enumerate(values):
         ax.annotate(
-            number(float(v), 2), (max(v, floor), i), (5, 0), textcoords="offset points", va="center", fontsize=7
+            number(float(v), 2), (max(v, floor), i), (5, 0), textcoords="offset points", va="center", fontsize=8.5
         )
     ax.set_xscale("log")
     ax.set_xlim(floor, 30)

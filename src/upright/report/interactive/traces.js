@@ -86,10 +86,10 @@ const TRACES = [];
       if (!beside) return;
       models.forEach((m, i) => lower.lines.push({ name: models.length > 1 ? m.name : "measured \u2212 model", values: m.left,
         colour: i ? m.colour : own, dash: models.length > 1 ? m.dash : [], width: 1, broken: true }));
-      this.plot(`residual of ${panel.name}`, panel.unit, lower, { height: 100, last });
+      this.plot(`residual of ${panel.name}`, panel.unit, lower, { height: 100, follow: measured, left: true, last });
     }
 
-    plot(title, unit, { lines, bands }, { height, follow, log, last }) {
+    plot(title, unit, { lines, bands }, { height, follow, left, log, last }) {
       const values = [], head = element("p", { class: "head" }, element("strong", {}, unit ? `${title} [${unit}]` : title));
       for (const line of lines.filter((l) => l.name)) {
         const value = element("span", { class: "reading" }), key = element("canvas", { width: 48, height: 12, "aria-hidden": "true" });
@@ -103,7 +103,7 @@ const TRACES = [];
         grid: { stroke: () => this.colour(RULE), width: 1 } };
       const u = new uPlot({
         width: this.box.clientWidth || 600, height: height + (last ? 44 : 8), padding: [6, 12, 0, 0], legend: { show: false },
-        scales: { x: { time: false }, y: { distr: log ? 3 : 1, range: log ? undefined : (plot, low, high) => this.range(plot, low, high, follow) } },
+        scales: { x: { time: false }, y: { distr: log ? 3 : 1, range: log ? undefined : (plot, low, high) => this.range(plot, low, high, follow, left) } },
         axes: [
           { ...axis, size: last ? 24 : 8, ...(last ? { label: `${this.run.axis} [${this.run.unit}]`, labelSize: 20, labelGap: 0, gap: 2 } : { values: () => [] }) },
           { ...axis, size: LEFT, gap: 6, space: height > 100 ? 34 : 20, values: (_, splits) => splits.map((v) => (v === null ? "" : shown(v))) },
@@ -139,13 +139,13 @@ const TRACES = [];
     }
 
     // A model that ran away must not flatten what was measured.
-    range(plot, low, high, follow) {
+    range(plot, low, high, follow, left) {
       if (!(low <= high)) return [-1, 1];
       if (follow) {
         const [first, after] = plot.series[0].idxs, seen = follow.slice(first, after + 1).filter((v) => v !== null);
         if (seen.length) {
           const [a, b] = [seen.reduce((x, y) => Math.min(x, y)), seen.reduce((x, y) => Math.max(x, y))], room = b - a || Math.abs(b) || 1e-9;
-          [low, high] = [Math.max(low, a - room), Math.min(high, b + room)];
+          [low, high] = left ? [Math.max(low, -room), Math.min(high, room)] : [Math.max(low, a - room), Math.min(high, b + room)];
         }
       }
       const room = 0.06 * (high - low) || Math.abs(high) * 0.1 || 1;

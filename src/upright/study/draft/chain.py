@@ -18,6 +18,7 @@ from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.signals.stretches import pieces
 from upright.signals.trips import find_trip
@@ -294,7 +295,9 @@ def starts(
             if switches:
                 columns["on"] = -savitzky_golay(np.where(command != 0, v, 0.0), dt, width).q
         columns["constant"] = np.ones(t.size)
-        slope, error = _regress({name: c[edge] for name, c in columns.items()}, -acting[own, i][edge], width)
+        answer = LeastSquares.of([c[edge] for c in columns.values()], -acting[own, i][edge])
+        errors = answer.errors(answer.residual.size / width)  # as many independent samples as smoothing widths
+        slope, error = (dict(zip(columns, x.tolist(), strict=True)) for x in (answer.slopes, errors))
         shared = next((n for n in columns if n in numbers and slope[n] > 0), "")
         if driven:
             clear = slope["u"] > 2 * error["u"] and not limit
@@ -373,17 +376,3 @@ def _by_first_motion(t: Array, u: Array, x: Array) -> float:
     stop = at + int(far[0])
     push = abs(float(np.mean(u[at:stop])))
     return max(push, 1e-9) * float(t[stop] - t[at]) ** 2 / 2 / max(abs(float(x[stop] - x[at])), 1e-12)
-
-
-def _regress(columns: dict[str, Array], a: Array, width: int) -> tuple[dict[str, float], dict[str, float]]:
-    """Slopes and their standard errors, with as many independent samples as there are smoothing widths."""
-    table = np.column_stack(list(columns.values()))
-    size = np.linalg.norm(table, axis=0)
-    size[size == 0] = 1.0
-    table /= size
-    slopes, *_ = np.linalg.lstsq(table, a, rcond=1e-9)
-    left = a - table @ slopes
-    variance = float(left @ left) / max(a.size / width - slopes.size, 1.0)
-    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 0.0))
-    slope, error = (dict(zip(columns, (x / size).tolist(), strict=True)) for x in (slopes, errors))
-    return slope, error

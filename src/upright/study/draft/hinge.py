@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from upright.physics import Plant
 from upright.physics.regressor import regressor
-from upright.records import Array
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import Motion
 
 
@@ -36,13 +34,9 @@ def hinge_of(plant: type[Plant], motion: Motion, inside: slice) -> Hinge:
     throws, pulls = ([k for k, b in enumerate(equations.base) if b.always and k != own and roles[k] == role]
                      for role in ("inertia", "force"))  # fmt: skip
     table = -row[[*throws, *pulls]].T
-    (throw, gravity), left = _slopes(table, row[own])
+    both = LeastSquares.of(table, row[own])
+    throw, gravity = both.slopes.tolist()
     return Hinge(
-        throw=throw, gravity=gravity, left=left, unthrown=_slopes(table[:, 1:], row[own])[1],
-        weightless=_slopes(table[:, :1], row[own])[1],
+        throw=throw, gravity=gravity, left=both.squares, unthrown=LeastSquares.of(table[:, 1:], row[own]).squares,
+        weightless=LeastSquares.of(table[:, :1], row[own]).squares,
     )  # fmt: skip
-
-
-def _slopes(table: Array, target: Array) -> tuple[list[float], float]:
-    slopes, *_ = np.linalg.lstsq(table, target, rcond=None)
-    return [float(s) for s in slopes], float(np.sum((target - table @ slopes) ** 2))

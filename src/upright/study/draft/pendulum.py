@@ -20,6 +20,7 @@ from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.records.columns import ANGLES, LENGTHS
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
@@ -140,8 +141,8 @@ def balance_of(record: Record, recognised: Recognised) -> Balanced | None:
     # close to upright all that the pendulum does to the first coordinate goes with its angle
     speed = motion.v[0]
     table = np.column_stack([push, motion.q[1], speed, np.sign(speed), np.ones_like(push)])[inside]
-    pull = float(np.linalg.lstsq(table, motion.a[0][inside], rcond=None)[0][0])
-    return Balanced(rate=math.sqrt(hinge.gravity), throw=hinge.throw, pull=pull, centre=centre)
+    pull = LeastSquares.of(table, motion.a[0][inside]).slopes[0]
+    return Balanced(rate=math.sqrt(hinge.gravity), throw=hinge.throw, pull=float(pull), centre=centre)
 
 
 def recognised_upright(recognised: Recognised, balanced: Balanced) -> Recognised:

@@ -13,6 +13,7 @@ from upright.physics import PLANTS, Plant, find
 from upright.readers.inspection import Column, Inspection, effort_unit
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS, bare_name
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
@@ -386,14 +387,11 @@ def _pushed(t: Array, u: Array, x: Array) -> float:
     motion = savitzky_golay(np.interp(grid, t, x), step, width)
     push = savitzky_golay(np.interp(grid, t, u), step, width).q
     both = np.column_stack([push, motion.q, motion.v, np.sign(motion.v), np.ones_like(push)])[width:-width]
-    a, scale = motion.a[width:-width], np.abs(both).max(axis=0)
-    both = both[:, scale > 0] / scale[scale > 0]
-    if not scale[0] > 0:
+    a = motion.a[width:-width]
+    if not both[:, 0].any():
         return 0.0
-    slopes, *_ = np.linalg.lstsq(both, a, rcond=None)
-    alone, *_ = np.linalg.lstsq(both[:, 1:], a, rcond=None)
-    left, without = np.sum((a - both @ slopes) ** 2), np.sum((a - both[:, 1:] @ alone) ** 2)
-    return float(slopes[0]) if left < CLEAR * without else 0.0
+    pushed, alone = LeastSquares.of(both, a), LeastSquares.of(both[:, 1:], a)
+    return float(pushed.slopes[0]) if pushed.squares < CLEAR * alone.squares else 0.0
 
 
 CLEAR = 0.9

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.records import Array
+from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import Motion, noise_gain, savitzky_golay, white_noise
 from upright.signals.stretches import stretches
 
@@ -74,7 +75,7 @@ def free_from(t: Array, theta: Array, w: float, swings: float, hinge: Array | No
     size = np.abs(motion.q)
     moving = np.flatnonzero(size[:-width] > 0.05 * float(size.max()))
     late = moving[moving.size // 2 :]
-    slopes, *_ = np.linalg.lstsq(table[late], motion.a[late], rcond=None)
+    slopes = LeastSquares.of(table[late], motion.a[late]).slopes
     if slopes[0] <= 0:
         return swings
     pull = float(slopes[0]) * float(np.abs(np.sin(motion.q)).max())
@@ -275,7 +276,6 @@ def _by_hand(x: Array, pulls: Sequence[Array], sigma: float, hinge: Array | None
         thrown = gaussian_filter1d(hinge, sigma, order=2, mode="nearest")
         columns.append(np.cos(gaussian_filter1d(x, sigma, mode="nearest")) * thrown)
     table = np.column_stack(columns)
-    table /= np.maximum(np.abs(table).max(axis=0), 1e-300)
     edge = round(3 * sigma)
     pull = float(np.quantile(np.abs(a[edge:-edge]), 0.99))
     large = np.abs(a) > LARGE * pull  # a body that is held still, or pulled slowly, tells nothing of its springs
@@ -286,7 +286,7 @@ def _by_hand(x: Array, pulls: Sequence[Array], sigma: float, hinge: Array | None
     left = np.zeros_like(a)
     for _ in range(ROUNDS):  # least absolute errors, which a hand that jerks or lets go pulls at little
         root = np.sqrt(weight[large])
-        slopes, *_ = np.linalg.lstsq(table[large] * root[:, None], a[large] * root, rcond=1e-9)
+        slopes = LeastSquares.of(table[large] * root[:, None], a[large] * root).slopes
         left = a - table @ slopes
         weight = 1 / np.maximum(np.abs(left), 1e-3 * pull)
     noise = float(np.median(np.abs(left[large]))) / 0.6745

@@ -46,7 +46,7 @@ def predict(
     model: Any, study: Any, *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
-    """Score other runs with a model that was fitted before.
+    """Predict other runs with a fitted model, and score the prediction.
 
     Every run is scored, whatever its role. What a run lists under ``unknown`` (its initial state, unless it says
     otherwise) is estimated for that run alone; nothing else is. Around each prediction lies a band that should hold 90
@@ -88,7 +88,7 @@ def predict(
         if isinstance(source, str | os.PathLike) and not Path(source).exists():
             raise BadInput(f"{what} {source} does not exist; the call is upright predict OUT/fit.json STUDY.toml")
     fitted, of = fitted_of(model, "predict"), Path(called(model)).name
-    requested, on = _runs_to_predict(fitted, study, data)
+    requested, on = runs_to_predict(fitted, study, data)
     missing = [n for n in fitted.values if n not in requested.model.parameters]
     if missing:
         raise BadInput(
@@ -141,7 +141,7 @@ def _fitted_note(fitted_runs: Mapping[str, str], runs: int) -> str:
     return f"{what} {which}. "
 
 
-def _runs_to_predict(fitted: StoredFit, source: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:
+def runs_to_predict(fitted: StoredFit, source: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:
     """Study of the runs to score, and what it is called."""
     from upright.study.draft.from_record import study_of_record
     from upright.study.load import Study, load_study
