@@ -214,7 +214,7 @@ def between_blocks(
     block agrees on would lose it.
     """
     here, together = np.ix_(free, free), np.zeros((len(known), len(known)))
-    found: list[Array] = []
+    variances: list[Array] = []
     whole = np.diag(pseudo_inverse(A[here]))
     for parts in blocks.values():
         if len(parts) < min(BLOCKS):
@@ -230,10 +230,10 @@ def between_blocks(
         excess = np.maximum(np.sum(moved**2, axis=0) - known * odds.sum(axis=0), 0.0)
         spread = excess / np.where(weight > 0, weight, np.inf)
         away = np.minimum(share.sum(axis=0), 1.0) ** 2 + squares
-        found.append(spread * away * (student(len(parts) - 1) / student(freedom)) ** 2)
+        variances.append(spread * away * (student(len(parts) - 1) / student(freedom)) ** 2)
         steps = moved / np.sqrt(np.where(weight > 0, weight, np.inf))
         together += steps.T @ steps
-    return _along(together, np.mean(found, axis=0) if found else np.zeros(len(known)))
+    return _along(together, np.mean(variances, axis=0) if variances else np.zeros(len(known)))
 
 
 def _along(like: Array, variance: Array) -> Array:
