@@ -64,7 +64,7 @@ class RunRequest:
 
     def __post_init__(self) -> None:
         if (self.law is None) == (not self.excite and not self.samples):
-            raise BadInput('a run needs a law (--law design.json) or a signal (--excite "sine 0.5 2"), one of them.')
+            raise BadInput('A run needs either a law (--law design.json) or a signal (--excite "sine 0.5 2").')
         if not 0 < self.seconds <= 86_400:
             raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
         if self.mode not in MODES:

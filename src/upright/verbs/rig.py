@@ -153,7 +153,7 @@ def _let_go(start: Start | float | None, rig: Path, *, law: bool) -> float:
 def rig_check(
     *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
 ) -> Answer[Jitter]:
-    """Measure how late this machine wakes a loop, and say whether it holds a rate.
+    """Measure how late this machine wakes a loop, and say whether a rate is safe on it.
 
     The loop has the law and the supervision of a run.
 
