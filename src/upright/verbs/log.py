@@ -248,10 +248,10 @@ def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]
     from upright.physics import Plant
     from upright.verbs.handover import rig_of
 
-    if rig is None or rig == "":
+    if rig is None:
         return None, None
     if isinstance(rig, str | os.PathLike):
-        return read_known(str(rig), log)
+        return read_known(str(rig), log) if str(rig) else (None, None)
     if isinstance(rig, type) and issubclass(rig, Plant):
         return rig, None
     return rig_of(rig, "doctor", draws=0), None

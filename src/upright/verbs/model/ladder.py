@@ -70,7 +70,7 @@ def ladder(
     ----------
     study : path, Study, Record, DataFrame or FitAnswer
         Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted; or a log.
-    plant : class of a plant or its name, Rig, FitAnswer or Plant, optional
+    plant : class of a plant or its name, Rig, FitAnswer, Study, path of either, or Plant, optional
         For a log: what it is of, as `identify` takes it.
     out : path, optional
         Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.
