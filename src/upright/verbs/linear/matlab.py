@@ -77,5 +77,4 @@ def _fields(content: Variables, name: str, file: str) -> Variables:
 def _names(value: Any) -> tuple[str, ...]:
     """Texts of a cell, or one text; empty where there is none, or an empty one."""
     texts = [value] if isinstance(value, str) else cast(list[Any], value) if isinstance(value, list) else []
-    found = tuple(str(text) for text in texts)
-    return found if all(found) else ()
+    return tuple(map(str, texts)) if all(texts) else ()
