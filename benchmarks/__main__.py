@@ -28,14 +28,14 @@ from upright.workers import Workers
 NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
-    "workers", "long", "gpu", "crash", "safety", "false_stops", "minute", "images", "soak", "jitter", "gym", "at_hand",
-    "first", "kept", "strangers", "live", "peers", "mutants",
+    "workers", "long", "gpu", "crash", "safety", "dying", "false_stops", "minute", "images", "soak", "jitter", "gym",
+    "at_hand", "first", "kept", "strangers", "live", "peers", "mutants",
 )  # fmt: skip
 APART = ("peers", "mutants")
 """Those that run when they are named, and never among all: what is asked there is not how fast we are."""
 PUBLISHED = (
     "first", "kept", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers",
-    "crash", "safety", "false_stops", "soak", "jitter", "gym", "peers", "mutants",
+    "crash", "safety", "dying", "false_stops", "soak", "jitter", "gym", "peers", "mutants",
 )  # fmt: skip
 SHARED = (
     "first", "kept", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts",

@@ -27,6 +27,6 @@
 #define CEILING_WATCHDOG 5000 /* between two commands */
 #endif
 #ifndef CEILING_PATIENCE
-#define CEILING_PATIENCE 10000 /* that an armed rig at zero command waits for its host */
+#define CEILING_PATIENCE 1000 /* that an armed rig at zero command waits for its host */
 #endif
 #endif

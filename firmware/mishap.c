@@ -6,6 +6,7 @@
 
 void mishaps_prepare(mishaps_t *now, const furuta_t *rig) {
     memset(now, 0, sizeof *now);
+    now->motor = 1;
     for (int i = 0; i < 2; i++) {
         now->encoder[i].scale = 1;
         now->encoder[i].seen = furuta_counts(rig, i);
@@ -36,7 +37,7 @@ void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, double command, double
     if (!rig->running) return;
     hand_moves(&now->hand, rig, on, command != 0, dt);
     double size = fabs(rig->step * command) - rig->dead; /* beyond what the drive swallows */
-    furuta_move(rig, on && size > 0 ? rig->gain * copysign(size, command) : 0, dt);
+    furuta_move(rig, on && size > 0 ? now->motor * rig->gain * copysign(size, command) : 0, dt);
 }
 
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {
@@ -48,6 +49,7 @@ bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {
     if (!strcmp(line, "hold")) return rig->held = true;
     if (!strcmp(line, "release")) return now->hand.called = rig->held = false, rig->running = true;
     if (sscanf(line, "lift %lf", &value) == 1) return hand_lifts(&now->hand, value), true;
+    if (sscanf(line, "motor %lf", &value) == 1) return now->motor = value, true;
     if (sscanf(line, "kick %lf", &value) == 1) return rig->x[3] += value, true;
     if (sscanf(line, "put %lf %lf %lf %lf", x, x + 1, x + 2, x + 3) == 4) return memcpy(rig->x, x, sizeof x), true;
     if (sscanf(line, "corrupt %lf %llu", &value, &seed) == 2)

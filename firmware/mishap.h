@@ -19,6 +19,7 @@ typedef struct {
     double corruption; /* probability that a byte on the wire comes with a flipped bit */
     uint64_t random;
     bool cut; /* nothing comes from the host any more */
+    double motor; /* what the motor gets of its drive: 0.5 of a weak supply, -1 by swapped leads, 0 without an enable line */
     hand_t hand;
 } mishaps_t;
 
@@ -29,7 +30,7 @@ uint8_t over_the_wire(mishaps_t *now, uint8_t byte);
 
 /*     dead CHANNEL            alive CHANNEL          flip CHANNEL           scale CHANNEL FACTOR
  *     lose CHANNEL COUNTS     corrupt CHANCE SEED    cut                    join
- *     kick SPEED [rad/s]      hold                   release
+ *     kick SPEED [rad/s]      hold                   release                motor FACTOR
  *     put PSI PSI' THETA THETA'                     lift THETA (hand.h)
  * false for a line that is none of them. */
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line);

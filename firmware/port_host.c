@@ -14,6 +14,8 @@
  *     run TICKS       time passes without the host
  *     skip TICKS      the same, but of these ticks only the last one comes
  *     state           answers: tick, psi, psi', theta, theta', command [steps], enable line, mode
+ *     power           answers: tick, the last one with a command under power, the last one with its power stage on, and
+ *                     most ticks that came at once, as where others keep this process from its time
  * It ends with its standard input. */
 #define _GNU_SOURCE
 #include <fcntl.h>
@@ -47,6 +49,7 @@ static uint32_t counter[CHANNELS];
 static uint16_t illegal;
 static int16_t command;
 static uint32_t tick, passed; /* of the board, and since its process began */
+static uint32_t driven, powered, at_once; /* as `power` answers */
 
 uint32_t port_counts(uint8_t channel) { return counter[channel]; }
 uint16_t port_illegal(void) { return illegal; }
@@ -72,6 +75,9 @@ void port_send(const uint8_t *bytes, uint16_t n) {
 }
 
 static void pass(uint32_t ticks, uint16_t late) {
+    if (enabled) powered = passed + ticks;
+    if (enabled && command) driven = powered;
+    if (ticks > at_once) at_once = ticks;
     for (uint32_t i = 0; simulated && i < ticks * SUBSTEPS; i++)
         mishaps_move(&mishaps, &plant, enabled, command, 1e-9 * PERIOD_NS / SUBSTEPS);
     static long shown[CHANNELS];
@@ -105,6 +111,10 @@ static void obey(const char *line) {
         while (a-- > 0) pass(1, 0);
     } else if (sscanf(line, "skip %ld", &a) == 1 && port_virtual && a > 0) {
         pass((uint32_t)a, 0);
+    } else if (!strcmp(line, "power")) {
+        printf("%u %u %u %u\n", passed, driven, powered, at_once);
+        fflush(stdout);
+        return;
     } else if (!strcmp(line, "state")) {
         printf("%u %.17g %.17g %.17g %.17g %d %d %d\n", passed, plant.x[0], plant.x[1], plant.x[2], plant.x[3], command,
                enabled, rig_mode());

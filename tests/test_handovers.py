@@ -329,6 +329,80 @@ def test_whatever_a_verb_is_given_it_answers_or_says_in_a_sentence(verb, tmp_pat
     check()
 
 
+GAINS = up.place(RIG.linear("inverted"), [-4 + 2j, -4 - 2j, -17, -3])
+LOGS = {"record", "frame", "file"}
+FITS = {"fit", "fit.json"}
+RIGGED = FITS | {"study", "rig", "plant"}
+LINEAR = {"state space", "control", "matrices"}
+FEEDBACK = {"gains", "array"}
+SHORT = {"draws": 2, "seconds": 0.1}
+TABLE = {  # a plant alone has no encoders, a log in N m is none of a rig that takes volts
+    "read": (up.read, LOGS),
+    "show": (up.show, LOGS),
+    "init": (up.init, LOGS),
+    "law": (lambda x: up.law(x, command="T", measured="theta"), LOGS),
+    "doctor": (up.doctor, LOGS),
+    "rig of a doctor": (lambda x: up.doctor(driven(0.15), rig=x), RIGGED | {"class", "none"}),
+    "identify": (up.identify, LOGS | {"fit", "study"}),
+    "rig of identify": (lambda x: up.identify(driven(0.15), x), RIGGED - {"rig"} | {"class", "none"}),
+    "predict with": (lambda x: up.predict(x, driven(0.05)), FITS),
+    "design": (lambda x: up.design(x, poles=POLES, **DRIVE), RIGGED),
+    "design without counts": (
+        lambda x: up.design(x, poles=POLES, period="2 ms", limit=2.0),
+        RIGGED - {"plant"} | LINEAR | {"sampled"},
+    ),
+    "chance": (lambda x: up.chance(x, GAINS, **SHORT, **DRIVE), RIGGED),
+    "gains of chance": (lambda x: up.chance(DRIVEN, x, **SHORT), FEEDBACK),
+    "play": (lambda x: up.play(x, **SHORT, **DRIVE), RIGGED),
+    "simulate": (lambda x: up.simulate(x, seconds=0.1), RIGGED | LINEAR | {"sampled", "transfer"}),
+    "law of a motion": (lambda x: up.simulate(DRIVEN, x, seconds=0.1), FEEDBACK | {"law", "none"}),
+    "gains of matrices": (lambda x: up.simulate(RIG.linear("inverted"), x, seconds=0.1), FEEDBACK | {"none"}),
+    "export": (lambda x: up.export(x, to="mjcf"), RIGGED),
+    "place": (lambda x: up.place(x, [-4, -5, -6, -7]), LINEAR | {"sampled"}),
+    "lqr": (lambda x: up.lqr(x, [1, 0, 1, 0], 1.0), LINEAR | {"sampled"}),
+    "dlqr": (lambda x: up.dlqr(x, [1, 0, 1, 0], 1.0), {"sampled", "matrices"}),
+    "hold": (lambda x: up.hold(x, "2 ms"), LINEAR | {"transfer"}),
+    "margins": (lambda x: up.margins(x, GAINS), LINEAR | {"sampled"}),
+    "prefilter": (lambda x: up.prefilter(x, GAINS), LINEAR | {"sampled"}),
+    "observer": (lambda x: up.observer(x, [0.1, 0.11, 0.12, 0.13]), {"sampled"}),
+    "survey": (up.survey, set()),
+    "loadings": (lambda x: up.loadings(x, added="0 kg"), set()),
+    "frequency": (up.frequency, {"file"}),
+}
+"""What a verb is called with, and the forms that it answers; every other one gets a sentence."""
+
+
+@pytest.fixture(scope="module")
+def everything(fit, log, tmp_path_factory):
+    """One of each thing that can be handed over."""
+    at = tmp_path_factory.mktemp("handed")
+    log.to_csv(at / "log.csv")
+    model = RIG.linear("inverted")
+    return {
+        "record": log, "frame": log.to_pandas(), "file": at / "log.csv", "arrays": (log.t, log["theta"]),
+        "study": fit.study, "fit": fit, "fit.json": fit.save(at / "fit.json"), "rig": DRIVEN, "plant": RIG,
+        "class": up.Furuta, "state space": model, "sampled": up.hold(model, "2 ms"), "control": model.to_control(),
+        "transfer": control.tf([1], [1, 0.2, 4]), "matrices": (model.A, model.B), "gains": GAINS,
+        "array": np.array(GAINS.K), "law": up.design(DRIVEN, poles=POLES).law, "none": None,
+        "no file": at / "nowhere.csv",
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", TABLE)
+def test_every_verb_answers_every_form_that_it_takes_and_says_what_else_it_needs(
+    verb, everything, tmp_path, monkeypatch
+):  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    call, takes = TABLE[verb]
+    answered = set()
+    for form, handed in everything.items():
+        with suppress(up.UprightError):
+            call(handed)
+            answered.add(form)
+    assert answered == takes
+
+
 def test_an_array_of_gains_for_a_force_is_not_taken_for_gains_of_a_command():
     """The drive turns the command round, so that what stabilises the plant by its force drives the rig away."""
     turned = DRIVEN.replace(gain="-0.65 N m/V")

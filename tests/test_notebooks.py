@@ -32,9 +32,13 @@ def stored_in(path):
     return nbformat.read(path, as_version=4)
 
 
-def of(*sources):
+def sources(path):
+    return "\n".join(cell.source for cell in cells(stored_in(path)))
+
+
+def of(*code):
     """Notebook of these cells, never run."""
-    return new_notebook(cells=[new_code_cell(source) for source in sources])
+    return new_notebook(cells=[new_code_cell(source) for source in code])
 
 
 @pytest.mark.slow
@@ -77,6 +81,24 @@ def test_every_picture_and_table_of_a_notebook_is_introduced(path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_the_hidden_solution_of_an_exercise_runs_by_itself(path, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    hidden = [cell.source for cell in stored_in(path).cells if cell.source.startswith("<details>")]
+    solutions = [code for source in hidden for code in re.findall(r"```python\n(.*?)```", source, re.S)]
+    assert len(solutions) == len(hidden) > 0
+    for solution in solutions:
+        exec(compile(solution, path.stem, "exec"), {})
+
+
+def test_a_notebook_imports_nothing_of_the_checkout():
+    """So that it runs where only the package is installed."""
+    for path in NOTEBOOKS:
+        imported = re.findall(r"^(?:from|import) (docs|tests|benchmarks|examples)\b", sources(path), re.M)
+        assert not imported, path.name
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
@@ -87,10 +109,10 @@ def test_every_picture_and_table_of_a_notebook_is_introduced(path):
 )
 def test_the_derivation_of_eq_3_notices_a_mistake(right, wrong):
     notebook = stored_in(ROOT / "docs" / "tutorials" / "experiment_4.ipynb")
-    sources = [cell.source for cell in cells(notebook)]
-    assert sum(right in source for source in sources) == 1
+    code = [cell.source for cell in cells(notebook)]
+    assert sum(right in source for source in code) == 1
     with pytest.raises(CellFailed, match=r"cell 7 raises AssertionError"):
-        executed(of(*(source.replace(right, wrong) for source in sources)))
+        executed(of(*(source.replace(right, wrong) for source in code)))
 
 
 def test_cells_share_their_names_and_show_print_picture_and_last_value():

@@ -53,6 +53,12 @@ other = up.simulate(arm, u=-0.8 * torque, seconds=10, dt=5e-3, start={"theta": "
 fit.save("fit.json")
 up.predict("fit.json", other.to_pandas()[["psi", "theta", "T"]])
 
+# %% compare
+rigid = up.identify(
+    log, up.Furuta, known={**known, "b_1c": 0.0, "b_2c": 0.0}, ask=["J_d", "J_p", "b_1", "b_2"]
+)
+up.compare([fit, rigid], log=other.to_pandas()[["psi", "theta", "T"]]).table
+
 # %% ladder
 up.ladder(fit.study)
 

@@ -30,7 +30,6 @@ class Declaration:
 
     Attributes
     ----------
-    name : str
     order : int
         Its place in lists, the smallest first.
     """

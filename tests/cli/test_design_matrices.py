@@ -191,7 +191,7 @@ HOSTILE = [
     ("A = [[0, 1], [2, 3]]\nB = [0, 0]", "cannot move the pole"),
     ("A = [[0, 1], [2, 3]]\nB = [0, 1]\nC = [[0, 0]]", "the outputs do not show the mode"),
     ("A = [[0, 1], [2, 3]]\nB = [0, 1]\nC = [[1, 0]]\nD = [[1]]\ndt = 0.01", "--delay 1"),
-    ("A = [[0, 1", "this is no TOML"),
+    ("A = [[0, 1", "this is not TOML"),
     ("[rig]\nplant = 'furuta'", "matrices come with no 'rig'"),
 ]
 

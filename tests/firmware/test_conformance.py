@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.boards import PicoLine, plant, rig_on
 from benchmarks.designs import GAIN, PARAMETERS
-from tests.firmware.test_pwm import STEPS, SUPPLY
+from tests.firmware.test_pwm import MEGA_STEP, SUPPLY
 from tests.rigs import conformance
 
 HANGING = plant(PARAMETERS, GAIN)
@@ -24,7 +24,7 @@ def specimen(request):
         how["drive"] = request.param
 
     def make():
-        board = start(*HANGING, *([f"step={SUPPLY / STEPS!r}"] if bridge else []), **how)
+        board = start(*HANGING, *([f"step={MEGA_STEP!r}"] if bridge else []), **how)
         rig = board.rig(lockstep=True, **({"full_scale": SUPPLY} if bridge else {}))
         boards[rig] = board
         return rig

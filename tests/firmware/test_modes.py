@@ -422,7 +422,7 @@ def test_an_armed_rig_whose_host_went_away_is_switched_off(host):
     board, rig = running(host)
     rig.stop()
     rig.arm()
-    board.do("run 10000")
+    board.do("run 1000")
     assert board.state()[6:] == [1.0, Mode.ARMED]
     board.do("run 1")
     assert dead(board)
@@ -672,7 +672,7 @@ def pulsed(host, ticks, watchdog=0.02):
     rig.clear_fault()
     rig.configure(replace(WIDE, watchdog=watchdog, saturation=math.inf))
     rig.arm()
-    board.do("run 5000")  # a long while armed
+    board.do("run 900")  # most of its patience while armed
     line.write(pack(Kind.SELF_TEST, 200, rig.session, self_test_body(FULL, ticks)))
     (reply,) = Parser().feed(line.read(1.0))
     read = status(reply.body)

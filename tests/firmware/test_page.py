@@ -11,12 +11,13 @@ import pytest
 
 import upright as up
 from benchmarks.boards import COUNTS, plant
-from benchmarks.designs import GAIN, PARAMETERS
-from tests.firmware.test_laboratory import RIG, STUDY
-from tests.firmware.test_pwm import STEPS, SUPPLY
+from tests.firmware.test_laboratory import GAIN, RIG, STUDY, TRUTH
+from tests.firmware.test_power_up import Maker
+from tests.firmware.test_pwm import MEGA_STEP, SUPPLY
+from upright.running.doctor import check_up
 
 PAGE = (Path(__file__).parents[2] / "docs" / "tutorials" / "own_rig.md").read_text(encoding="utf-8")
-FOLLOWED = STUDY.replace('converter = "0.00030517578125 V"', f'converter = "{SUPPLY / STEPS} V"')
+FOLLOWED = STUDY.replace('converter = "0.00030517578125 V"', f'converter = "{MEGA_STEP} V"')
 """The study of a rig with its supply in steps of PWM, as step 3 asks."""
 SCALE = re.search(r"\[board\]\n +(full_scale = [\d.]+)\n", PAGE)[1]
 
@@ -34,30 +35,18 @@ def described(tmp_path):
     return write
 
 
-def test_the_doctor_of_step_4_finds_a_rig_that_is_wired_well(avr, described):
-    board = avr(*plant(PARAMETERS, GAIN), f"step={SUPPLY / STEPS!r}", drive="pair")
-
-    def turns(sentence):
-        board.do("put 0.3 0 0.3 0" if "theta" in sentence else "put 0.3 0 0 0", "hold", "run 20")
-        return True
-
-    found = up.rig_doctor(described(board.port), clear=True, pulse=False, hand=turns)
-    told = {f.what: f for f in found.value.findings}
-    assert "two PWM lines" in told["link"].observed
-    assert [f for f in told.values() if f.good is False] == []
-    assert {"psi by hand", "theta by hand"} <= told.keys()
-
-
-def test_the_doctor_of_step_4_finds_channels_that_are_swapped(avr, described):
-    board = avr(*plant(PARAMETERS, GAIN), f"step={SUPPLY / STEPS!r}", drive="pair")
-    board.do("flip 0")
-
-    def turns(sentence):
-        board.do("put 0.3 0 0.3 0" if "theta" in sentence else "put 0.3 0 0 0", "hold", "run 20")
-        return True
-
-    found = up.rig_doctor(described(board.port), clear=True, pulse=False, hand=turns)
-    assert [f.what for f in found.value.findings if f.good is False] == ["psi by hand"]
+def test_the_doctor_of_step_4_leaves_the_drive_off_and_that_of_step_6_tries_it(avr, described):
+    board = avr(*plant(TRUTH.parameters(), GAIN), f"step={MEGA_STEP!r}", drive="pair")
+    rig, maker = described(board.port), Maker(board)
+    first = up.rig_doctor(rig, clear=True, pulse=False, hand=maker).value
+    observed = {f.what: f.observed for f in first.findings}
+    assert "two PWM lines" in observed["link"]
+    assert {"psi by hand", "theta by hand"} <= observed.keys()
+    assert first.sound
+    assert not [s for s in maker.said if "Supply on" in s]
+    second = check_up(rig, clear=True, hand=maker, wait=lambda seconds: board.do(f"run {round(1e3 * seconds)}"))
+    assert second.sound, second.verdict
+    assert [f for f in second.findings if f.good is None] == []
 
 
 def test_the_ceilings_of_step_5_are_the_limits_of_rig_toml(described, tmp_path):

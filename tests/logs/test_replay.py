@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -143,6 +144,15 @@ def test_a_rule_without_an_end_is_stopped(line, monkeypatch):
     log = run(rows=100)
     with pytest.raises(BadInput, match=r"was stopped: it gave no commands for 100 rows within 0\.4 s"):
         replay(replace_law(log, rule(line, "1")))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system holds a process to an amount of memory")
+@pytest.mark.parametrize("line", ["a = [0] * 10**9", "a = [1]\n for b in range(30): a = [*a, *a]"])
+def test_a_rule_that_takes_all_memory_gets_a_sentence(line, monkeypatch):
+    """Both ask for 8 GB, at once and by and by."""
+    monkeypatch.setattr("upright.logs.replay.MEMORY", 1 << 29)
+    with pytest.raises(BadInput, match="fails at row 1, 5 s"):
+        replay(replace_law(run(), rule(line, "1")))
 
 
 @pytest.mark.skipif(shutil.which("true") is None, reason="no program here that does nothing")

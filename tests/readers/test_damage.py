@@ -35,7 +35,7 @@ def source(data: bytes) -> Source:
         (b"t,x,x\n0,1,2\n1,2,3\n", "line 1, column 3 \\(x\\).*got this one twice"),
         (b"a,b\n3,1\n2,2\n", "line 1.*a time column named 't'"),
         (b"Sample,x\n1,1\n2,2\n", "only the sample index"),
-        (b"t,x\n", "expected rows of numbers"),
+        (b"t,x\n", "there are no rows of numbers"),
         (b"t,x\n0,1\n", "at least 2 samples"),
         (b"t,x\n0,1\n1,\x002\n", "line 3, column 3.*byte 0x00"),
         (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "binary format"),

@@ -72,13 +72,13 @@ TORN = "line 5, column 2 (x): expected 2 decimals and a line end, got '4.0'"
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("a\nb\n", "line 1: expected rows of numbers under at most one line of names, got none; readable are"),
+        ("a\nb\n", "line 1: there are no rows of numbers, with at most one line of names above them; formats"),
         ("t,x,y\n0,1\n", "line 1: expected a name for each of the 2 columns below, got 3"),
         ("# by hand\nt,x,y\n0,1\n", "line 2: expected a name for each of the 2 columns"),
         ("\nt,x,t\n0,1,2\n", "line 2, column 3 (t): expected a different name for each column"),
         ("n,x\n0,1\n1,2\n", "line 1: expected a time column named 't' or 'time', got only the sample index 'n'"),
         ("a,x\n1,1\n0,2\n", "line 1: expected a time column named 't' or 'time', got: a, x; name the time column"),
-        ("x\n" * 200 + "0,1\n", "expected rows of numbers"),
+        ("x\n" * 200 + "0,1\n", "there are no rows of numbers"),
         ("x,t\n0,1\n\n0,1\n", "line 4, column 2 (t): time must increase from row to row, got 1 s after 1 s"),
         ("t,x\n0,1\n1,2,3\n2,3\n", "line 3: expected 2 numbers, got 3; mend or delete the row"),
         ("t,x\n0,1\n1,2\n2\n", "line 4: expected 2 numbers, got 1; the last row is torn"),

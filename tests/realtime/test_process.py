@@ -138,12 +138,15 @@ def test_a_loop_that_is_killed_leaves_its_rows_and_a_sentence(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_a_loop_that_is_asked_to_end_zeroes_first(tmp_path):
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP"])
+def test_a_loop_that_is_asked_to_end_or_to_stand_still_zeroes_first(tmp_path, name):
+    """Boards without a watchdog keep what they were last given: no closed terminal or Ctrl-Z may leave one driven."""
+
     def end_it(state):
         if state.phase == "running" and state.tick > 1700:
             for child in multiprocessing.active_children():
                 if child.name == "upright loop":
-                    os.kill(child.pid, signal.SIGTERM)
+                    os.kill(child.pid, getattr(signal, name))
         return ""
 
     end = run_in_process(order(tmp_path, seconds=60.0), watch=end_it)

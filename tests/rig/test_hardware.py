@@ -56,12 +56,12 @@ def test_what_is_missing_is_asked_for_with_every_way_to_say_it():
         )
     said = str(caught.value)
     assert said.startswith(
-        "design needs what neither the study nor its fit says: servo period (--period or [rig] servo_period"
-        ' = "2 ms"); encoder counts of theta ([sensors.theta] counts_per_rev or counts_per_m). Give it as shown, or'
+        "design needs numbers that neither the study nor its fit has: servo period (--period or [rig] servo_period"
+        ' = "2 ms"); encoder counts of theta ([sensors.theta] counts_per_rev or counts_per_m). Give the option, or'
     )
     assert "limit" not in said.partition(";")[0]
-    assert "--vendor NAME takes a data sheet" in said
-    with pytest.raises(BadInput, match=r"\. Write it into the study and identify"):
+    assert "--vendor NAME takes the data sheet" in said
+    with pytest.raises(BadInput, match=r"\. Write them into the study and identify"):
         RIG.demand({"servo_period": ""}, "design", sheet="vendor=")
 
 

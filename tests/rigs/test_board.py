@@ -32,15 +32,18 @@ class Script:
     def __init__(self, counts=((0, 0),), about=ABOUT):
         self.counts, self.about = list(counts), about
         self.row, self.time, self.written, self.enabled, self.closed = 0, 0.0, [], [], 0
+        self.calls = []
 
     def open(self):
         return self.about
 
     def write(self, command):
         self.written.append(command)
+        self.calls.append(("write", command))
 
     def enable(self, on):
         self.enabled.append(on)
+        self.calls.append(("enable", on))
 
     def advance(self):
         self.row += 1
@@ -65,6 +68,20 @@ def armed(counts=((0, 0),), about=ABOUT, **changes):
     board.configure(replace(WIDE, **changes))
     board.arm()
     return board, port
+
+
+def test_a_power_stage_goes_on_behind_a_zero_and_is_switched_off_again_in_every_tick_off():
+    """A converter and a line that lost what they were given get it again."""
+    board, port = armed()
+    assert port.calls[-2:] == [("write", 0.0), ("enable", True)]
+    board.start(Mode.HOST)
+    board.exchange(2.0)
+    for off in (board.stop, board.estop):
+        off()
+        port.calls.clear()
+        for _ in range(3):
+            board.exchange(2.0)
+        assert port.calls == [("write", 0.0), ("enable", False)] * 3
 
 
 def ran(counts, ticks, mode=Mode.HOST, command=0.0, **changes):

@@ -12,7 +12,8 @@ from upright.errors import RigStopped
 from upright.rig.makes import PER_METRE, make_rig
 from upright.running import doctor
 from upright.running.chapter import checkup_chapter
-from upright.running.doctor import MOVED, Checkup, CheckupFinding, check_up
+from upright.running.doctor import Checkup, CheckupFinding, check_up
+from upright.running.power_up import LENGTH
 from upright.running.rig import stage_of
 
 
@@ -44,7 +45,7 @@ def found(checkup, what):
 
 @pytest.mark.parametrize("make", ["furuta", "linear"])
 def test_a_sound_rig_shows_what_it_is_and_how_far_a_hand_moved_it(tmp_path, make):
-    """The twin's hand moves an angle by a tenth of a radian and a cart by a centimetre; shown are whole counts."""
+    """The twin's hand turns a pendulum once round, an arm with a cable by a quarter, and moves a cart by 10 cm."""
     rig = make_rig(make)
     checkup = check_up(rig_file(tmp_path, make))
     assert checkup.sound
@@ -52,12 +53,14 @@ def test_a_sound_rig_shows_what_it_is_and_how_far_a_hand_moved_it(tmp_path, make
     assert "2 encoders, a tick every 0.884 ms" in found(checkup, "link").observed
     assert found(checkup, "servo period").observed == "0.884 ms, described as 0.884 ms"
     driven, _ = (c.name for c in rig.plant.coordinates)
-    turned = f"showed {round(0.1 / math.tau * 16_000) * 360 / 16_000:.3g} degrees"
-    assert found(checkup, "theta by hand").observed == turned
-    assert found(checkup, f"{driven} by hand").observed == (turned if driven == "psi" else "showed 10 mm")
+    assert found(checkup, "theta by hand").observed == "showed 360 degrees"
+    assert found(checkup, f"{driven} by hand").observed == ("showed 90 degrees" if driven == "psi" else "showed 100 mm")
     limit = f"command {rig.limit:.4g} V; watchdog 20 ms"
     assert found(checkup, "limits, read back").observed.endswith(limit)
-    assert [f.good for f in checkup.findings] == [True] * 7
+    assert [f.good for f in checkup.findings] == [True] * len(checkup.findings)
+    assert [f.what for f in checkup.findings[-5:]] == [
+        "the drive, forward", "a small pulse", "the drive, backward", "end of travel", "watchdog"
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("channel", [0, 1])
@@ -71,21 +74,24 @@ def test_a_channel_that_is_dead_or_counts_backwards_is_told_by_its_name(tmp_path
     assert found(checkup, f"{other} by hand").good
     wired(lambda rig: rig.port.encoders.scaled(channel, -1.0))
     finding = found(check_up(rig_file(tmp_path), pulse=False), f"{name} by hand")
-    assert (finding.good, finding.observed[:11]) == (False, "showed -5.7")
+    assert (finding.good, finding.observed.split(" degrees")[0]) == (False, f"showed -{90 * (1 + 3 * channel)}")
     assert finding.observed.endswith("it counts the wrong way, swap its channels")
 
 
 def test_a_hand_is_asked_in_the_coordinate_s_unit_and_may_refuse(tmp_path):
     asked = []
     checkup = check_up(rig_file(tmp_path, "linear"), hand=lambda text: bool(asked.append(text)), pulse=False)
-    assert [text.split(" by some ") for text in asked] == [
-        ["Move x by hand in its positive sense", "mm."],
-        ["Move theta by hand in its positive sense", "degrees."],
+    assert [text.split(",")[0] for text in asked] == [
+        "Move x by hand by 100 mm in the sense that is to be positive",
+        "Move theta by hand by one full turn",
     ]
-    left = [found(checkup, w) for w in ("x by hand", "theta by hand", "a small pulse")]
-    assert [(f.observed, f.good) for f in left] == [("not moved", None)] * 2 + [("not given", None)]
+    assert (
+        "its free end leaving in the positive sense of x" in asked[1]
+    )  # fig. A1: its end is faster than the cart by l theta'
+    left = [found(checkup, w) for w in ("x by hand", "theta by hand", "the drive")]
+    assert [(f.observed, f.good) for f in left] == [("not moved", None)] * 2 + [("not tried", None)]
     assert checkup.sound
-    assert checkup.verdict.endswith("Not looked at: x by hand, theta by hand, a small pulse.")
+    assert checkup.verdict.endswith("Not looked at: x by hand, theta by hand, the drive.")
 
 
 def test_a_stop_that_is_pressed_meanwhile_is_told_instead_of_the_next_channel(tmp_path, wired):
@@ -97,22 +103,25 @@ def test_a_stop_that_is_pressed_meanwhile_is_told_instead_of_the_next_channel(tm
     assert not checkup.sound
 
 
-@pytest.mark.parametrize(("share", "good"), [(0.11, True), (0.09, False)])
-def test_a_hand_that_moved_a_tenth_of_what_it_should_is_seen(tmp_path, wired, share, good):
-    """5 mm of a cart are asked for."""
+@pytest.mark.parametrize(
+    ("share", "words"), [(0.81, None), (1.19, None), (0.78, "0.78 times"), (1.22, "1.2 times"), (0.09, "not connected")]
+)
+def test_a_hand_may_miss_by_a_fifth_what_it_is_asked_for(tmp_path, wired, share, words):
+    """100 mm of a cart are asked for."""
     rigs = []
     wired(rigs.append)
 
     def hand(text):
-        if "x" in text:
-            rigs[0].port.hold("hanging", [share * MOVED / 10, 0.0, 0.0, 0.0])
+        if "Move x" in text:
+            rigs[0].port.hold("hanging", [share * LENGTH, 0.0, 0.0, 0.0])
             return True
         return False
 
     finding = found(check_up(rig_file(tmp_path, "linear"), hand=hand, pulse=False), "x by hand")
-    assert finding.good == good
-    counts = math.floor(share * MOVED / 10 * PER_METRE + 0.5)
-    assert finding.observed.split(":")[0] == f"showed {1e3 * counts / PER_METRE:.3g} mm"
+    assert (finding.good, words or "showed") == (words is None, words or "showed")
+    assert (words or "showed") in finding.observed
+    counts = math.floor(share * LENGTH * PER_METRE + 0.5)
+    assert finding.observed.startswith(f"showed {1e3 * counts / PER_METRE:.3g} mm")
 
 
 def test_a_rig_that_is_not_the_one_described_is_told(tmp_path, wired):
@@ -135,12 +144,12 @@ def test_a_rig_that_is_not_the_one_described_is_told(tmp_path, wired):
     )
 
 
-def test_a_pulse_that_nothing_answers_is_told_as_the_pulse(tmp_path, wired):
-    wired(lambda rig: rig.port.encoders.dead(0))
-    checkup = check_up(rig_file(tmp_path))
-    last = checkup.findings[-1]
-    assert (last.what, last.good) == ("a small pulse", False)
-    assert "psi" in last.observed
+def test_a_drive_that_moves_nothing_is_told_as_the_drive(tmp_path, wired):
+    """Its encoders are well."""
+    wired(lambda rig: setattr(rig.port, "enable", lambda on: None))
+    last = check_up(rig_file(tmp_path)).findings[-1]
+    assert (last.what, last.good) == ("the drive, forward", False)
+    assert "not even 5 V moved psi: nothing drives it" in last.observed
 
 
 def test_the_board_is_let_go_whatever_was_found(tmp_path, wired):

@@ -345,8 +345,8 @@ def test_the_rest_is_told_from_the_second_half_about_what_was_held_or_what_it_va
         ({"seconds": math.nan}, "got nan s"),
         ({"mode": "board"}, "--mode is host or mcu, got 'board'"),
         ({"reference": "step 0.1"}, "a reference is for a law"),
-        ({"excite": ""}, "one of them"),
-        ({"law": "design.json"}, "one of them"),
+        ({"excite": ""}, "either a law"),
+        ({"law": "design.json"}, "either a law"),
     ],
 )
 def test_a_run_that_cannot_be_asked_is_refused(folder, how, words):
@@ -373,7 +373,7 @@ def test_a_twin_s_hand_brings_it_where_it_is_held_and_lets_go_with_the_tilt_aske
 
 
 def test_what_contradicts_itself_is_refused(folder, tmp_path):
-    with pytest.raises(BadInput, match="one of them"):
+    with pytest.raises(BadInput, match="either a law"):
         RunRequest(rig=folder / "RIG.toml")
     (tmp_path / "law.json").write_text("{}", encoding="utf-8")
     with pytest.raises(BadInput, match="design again"):

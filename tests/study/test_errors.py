@@ -166,9 +166,9 @@ def test_more_than_anybody_means_is_a_sentence(folder, right, wrong, says):
     ("text", "says"),
     [
         ("", "line 1: a study needs a table [rig]"),
-        ("[rig\n", "line 1: this is no TOML"),
-        ('[rig]\nplant = "furuta"\nplant = "furuta"\n', "line 3: this is no TOML"),
-        ("[rig]\nplant = furuta\n", "line 2: this is no TOML"),
+        ("[rig\n", "line 1: this is not TOML"),
+        ('[rig]\nplant = "furuta"\nplant = "furuta"\n', "line 3: this is not TOML"),
+        ("[rig]\nplant = furuta\n", "line 2: this is not TOML"),
         ("t,theta\n0,1\n", "upright init"),
         (GOOD.partition("[[runs]]")[0], "needs at least one run"),
         (GOOD.partition("[[runs]]")[0] + "[runs]\n", "needs at least one run"),

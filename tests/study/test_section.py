@@ -151,8 +151,8 @@ def test_a_number_beyond_is_refused(value, sentence):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("a = 1\nb = \n", "s.toml, line 2: this is no TOML ("),
-        ("a = [1,\n", "this is no TOML ("),
+        ("a = 1\nb = \n", "s.toml, line 2: this is not TOML ("),
+        ("a = [1,\n", "this is not TOML ("),
         ("a = " + "[" * 3000, "a study holds numbers of a few digits and lists in lists"),
     ],
 )

@@ -42,7 +42,8 @@ def _asking(question: str) -> Callable[[str], bool] | None:
 
     def ask(sentence: str) -> bool:
         try:
-            return typer.confirm(f"{sentence} {question}", default=True, err=True)
+            text = sentence if sentence.endswith("?") else f"{sentence} {question}"
+            return typer.confirm(text, default=True, err=True)
         except typer.Abort:
             raise KeyboardInterrupt from None
 

@@ -57,7 +57,6 @@ def recover_law(
 
     Parameters
     ----------
-    record : Record
     measured, references : sequence of str
         Columns that the law reads; the first reference belongs to the first measured column and so on. A measured
         column without one is compared with zero.

@@ -43,7 +43,6 @@ class Task:
         Deviation from the equilibrium when the law is switched on, state by state.
     at : str
         Equilibrium to hold.
-    seconds : float
     hand : tuple of float
         Standard deviation of the start, as a hand holds it; none when empty.
     """
@@ -164,8 +163,6 @@ def preflight(
     model, sampled : StateSpace
         Its linear model about the equilibrium, and the same as the law was designed on; margins and noise count the
         rig's lag as well.
-    law : Law
-    task : Task
     parameters : mapping of str to array, shape (lanes,)
         Parameters of other rigs that the identification allows; empty when it tells of none.
     lanes : int
@@ -174,7 +171,6 @@ def preflight(
         Of the hand's errors.
     workers : Workers, optional
         Who computes the runs that the chance is taken from.
-    progress : callable, optional
     """
     driven = model.to_sampled(sampled.period, sampled.delay, rig.lag)  # whatever the law was designed on
     stands = bool(np.abs(poles_of(closed(driven, law))).max() < 1)
@@ -238,9 +234,6 @@ def largest(rig: Rig, law: Law, at: str, direction: ArrayLike, *, most: float, s
 
     Parameters
     ----------
-    rig : Rig
-    law : Law
-    at : str
     direction : array, shape (states,)
     most : float
         Largest factor on the direction to be tried.

@@ -123,7 +123,6 @@ def score(run: Trial, *, watched: str = "", fallen: float = FALLEN, band: float 
 
     Parameters
     ----------
-    run : Trial
     watched : str
         Coordinate that falls and settles; the last when omitted.
     fallen, band : float
@@ -219,19 +218,15 @@ def outcomes(
 
     Parameters
     ----------
-    rig : Rig
-    law : Law
     at : str
         Equilibrium to hold.
     starts : array, shape (lanes, states)
         Deviations from the equilibrium when the law is switched on.
-    seconds : float
     parameters : mapping of str to array, shape (lanes,)
         Parameters of the plant, and of the drive as ``"actuator.gain"`` and so on, in which the lanes differ from the
         rig.
     workers : Workers, optional
         Who computes blocks of lanes; the figures are the same.
-    progress : callable, optional
 
     Raises
     ------

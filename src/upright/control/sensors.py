@@ -134,7 +134,6 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
 
     Parameters
     ----------
-    model : Rig
     log : Record
         Readings by coordinate [m or rad] and ``u``, from rest, evenly sampled.
     known : mapping of str to float, optional

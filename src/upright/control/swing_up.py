@@ -169,7 +169,6 @@ class SwingUp:
 
     Attributes
     ----------
-    body : Body
     K : array, shape (4,)
         Gains of the feedback on position and speed of the driven body, angle from upright and its speed.
     P : array, shape (4, 4)
@@ -320,8 +319,6 @@ class Ascent:
 
     Attributes
     ----------
-    trial : Trial
-    law : SwingUp
     mode : array, shape (N,)
         What the law did: `SWINGING`, `HOLDING` or `TRIPPED`.
     angle : array, shape (N,)
@@ -405,8 +402,6 @@ def swing_up(
     ----------
     rig : Rig
         As it truly is.
-    law : SwingUp
-    seconds : float
     start : array, shape (states,), optional
         Where the rig is when the law is switched on; at rest, hanging, when omitted.
     pushes : array, shape (T,), optional

@@ -29,7 +29,6 @@ class Trial:
 
     Attributes
     ----------
-    rig : Rig
     at : str
         Equilibrium that was to be held.
     t : array, shape (N,)
@@ -84,7 +83,6 @@ def trial(
         Equilibrium to hold.
     start : array, shape (states,)
         Where the rig is when the law is switched on, as deviation from the equilibrium.
-    seconds : float
     reference : array, shape (T,), optional
         Reference at the samples; its last value is held.
     pushes : array, shape (T,), optional
@@ -134,8 +132,6 @@ def law_on_rig(rig: Rig, law: Law, rest: ArrayLike, reference: ArrayLike | None 
 
     Parameters
     ----------
-    rig : Rig
-    law : Law
     rest : array, shape (coordinates,)
         What it takes for the readings at the equilibrium.
     reference : array, shape (T,), optional

@@ -127,10 +127,8 @@ def watched(
 
     Parameters
     ----------
-    watch : Watch
     rig : Rig
         As it truly is.
-    law : Law
     start, seconds, rest
         As of `trial`.
     """

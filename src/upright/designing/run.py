@@ -225,7 +225,6 @@ def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
     ----------
     rig : Rig or StateSpace
         A plain model knows no encoders and no covariance, and needs no equilibrium.
-    request : DesignRequest
 
     Raises
     ------
@@ -416,7 +415,6 @@ def velocities(
     ----------
     model, sampled : StateSpace
         From the command to the coordinates.
-    speed : str
     memory : float
         Of the filtered difference.
     limit : float

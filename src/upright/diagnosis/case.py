@@ -52,7 +52,6 @@ class Case:
     ----------
     record, inspection
         The log, and what is known about it before any model.
-    plant : type of Plant or None
     rig : Rig or None
         With the numbers that are known; None where only the plant's name is, or the wiring of its columns is not
         specified.
@@ -179,7 +178,6 @@ def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
 
     Parameters
     ----------
-    text : str
     log : str
         File whose run a study may describe.
 

@@ -21,7 +21,6 @@ def chapter(diagnosis: Diagnosis, *, log: Path, rig: str = "", page: bool = True
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     log : Path
         As it was typed.
     rig : str

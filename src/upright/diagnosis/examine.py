@@ -33,7 +33,6 @@ def examine(
 
     Parameters
     ----------
-    record : Record
     rig : Rig or type of Plant, optional
         What needs one is left out without; what needs numbers is left out where only the kind of plant is known.
     wiring : Wiring, optional

@@ -52,7 +52,6 @@ class ForceBalance:
 
     Parameters
     ----------
-    motion : SmoothedMotion
     values : mapping of str to float
         Parameters of the plant [SI], friction zero.
     gain : float

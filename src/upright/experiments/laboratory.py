@@ -40,13 +40,10 @@ class ExperimentResult:
 
     Attributes
     ----------
-    experiment : Experiment
     make, rig : str
         Kind of rig, and its name.
-    chapter : Chapter
     state : str
         ``"done"``, ``"kept"`` from an earlier run, ``"stopped"`` half-way, or ``"failed"``.
-    seconds : float
     """
 
     experiment: Experiment

@@ -33,7 +33,6 @@ def nonideal(rig: Rig, seed: int) -> Rig:
 
     Parameters
     ----------
-    rig : Rig
     seed : int
         Of the flaws.
     """

@@ -66,7 +66,6 @@ class Experiment:
         Its name on the command line and of its folder.
     part_of : str
         Asking for this brings it as well: ``1`` means 1a and 1b.
-    title : str
     makes : tuple of str
         Makes on whose twins it can be made; the first is the paper's.
     on : callable

@@ -30,8 +30,6 @@ class Language:
         What goes before a new name.
     end : str
         What ends a statement.
-    remark : callable
-    floor, absolute : str
     limited : callable
         A value between plus and minus another.
     first : callable
@@ -44,7 +42,6 @@ class Language:
         Whether a value is NaN or infinite.
     stop : callable
         Statements that, on a condition, stop the law and end the sample with commands of zero.
-    either : str
     """
 
     number: Callable[[float], str]

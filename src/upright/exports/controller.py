@@ -22,10 +22,8 @@ class SampledController:
 
     Attributes
     ----------
-    law : Law or Rule
     readings, references, commands : tuple of str
     reading_units : tuple of str
-    command_unit : str
     signs : tuple of float
         Of the encoders, one for each reading.
     title : str
@@ -152,14 +150,7 @@ def of_law(law: Any) -> SampledController:
 
 
 def of_design(content: Any, source: str) -> SampledController:
-    """The law of `design.json`.
-
-    Parameters
-    ----------
-    content : mapping
-        What the file holds.
-    source : str
-        As it was called, for sentences about it.
+    """The law of a `design.json` with this content; `source` is what sentences about it call it.
 
     Raises
     ------
@@ -185,14 +176,7 @@ def of_design(content: Any, source: str) -> SampledController:
 
 
 def of_swing_up(content: Any, source: str) -> SampledController:
-    """The swing-up and catch of `swing_up.json`, a `Rule` with its limit.
-
-    Parameters
-    ----------
-    content : mapping
-        What the file holds.
-    source : str
-        As it was called, for sentences about it.
+    """The swing-up and catch of a `swing_up.json`, a `Rule` with its limit; see `of_design`.
 
     Raises
     ------

@@ -27,7 +27,6 @@ class RigVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     ----------
     fit : path or Rig
         fit.json or its folder.
-    num_envs : int
     max_episode_steps : int
         After which an episode is truncated.
     draws_seed : int

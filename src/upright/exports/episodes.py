@@ -37,7 +37,6 @@ class Episodes:
     ----------
     rig : Rig
         Whose draws are the rigs that its fit allows; a rig without draws is the same at every reset.
-    lanes : int
     task : {"balance", "swing_up"}
         From close to the equilibrium until it falls, or from hanging.
     at : str
@@ -48,7 +47,6 @@ class Episodes:
         Command that an action of 1 stands for; the rig's when omitted.
     travel : float, optional
         How far the driven body may go either way; the rig's when omitted, where it has one.
-    threads : int
 
     Raises
     ------

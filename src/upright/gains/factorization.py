@@ -76,7 +76,6 @@ def recover_locus(
         Half a unit of the last digit printed, of real and imaginary part; errors are measured in it.
     free : sequence of int
         Powers of s that a(s) has besides s^n; the others are zero, as for a body that nothing ties to ground.
-    ratio : float
 
     Raises
     ------

@@ -55,7 +55,6 @@ def place_sampled(model: StateSpace, estimator: Estimator, poles: ArrayLike) -> 
     ----------
     model : StateSpace
         With one input.
-    estimator : Estimator
     poles : array, shape (n,)
         [1/s], mapped to z; n without the commands on their way.
 
@@ -121,7 +120,6 @@ def margins(model: StateSpace, law: Law) -> Margins:
     ----------
     model : StateSpace
         Sampled; of one known at its samples alone the delay margin is its phase over its frequency.
-    law : Law
 
     Raises
     ------
@@ -176,11 +174,8 @@ def swing(model: StateSpace, law: Law, start: ArrayLike, samples: int) -> tuple[
 
     Parameters
     ----------
-    model : StateSpace
-    law : Law
     start : array, shape (n,)
         Deviation of the model's states; drive and commands on their way are at zero.
-    samples : int
     """
     A, n = closed(model, law), model.A.shape[0]
     out = np.hstack([law.D[:, : law.readings] @ model.C, law.C])

@@ -82,7 +82,6 @@ def observer(model: StateSpace, gain: ArrayLike, name: str = "observer") -> Esti
 
     Parameters
     ----------
-    model : StateSpace
     gain : array, shape (n, p)
         L, for instance from `kalman`.
     """
@@ -106,7 +105,6 @@ def placed_observer(model: StateSpace, poles: ArrayLike) -> Estimator:
 
     Parameters
     ----------
-    model : StateSpace
     poles : array, shape (n,)
         In conjugate pairs; n without drive and commands on their way.
 
@@ -157,7 +155,6 @@ def kalman(model: StateSpace, process: ArrayLike, noise: ArrayLike) -> Estimator
 
     Parameters
     ----------
-    model : StateSpace
     process : float or array, shape (n, n)
         What shakes the states from sample to sample: a covariance, or one number, the standard deviation of a white
         force held over a period [the input's unit].

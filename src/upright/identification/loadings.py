@@ -69,10 +69,8 @@ def swings(
 
     Parameters
     ----------
-    record : Record
     added : float
         Inertia added [kg or kg m^2].
-    label : str
     signal : str
         Column of the position, in any unit.
     command : str
@@ -273,7 +271,6 @@ def plan_loadings(
     ----------
     choice : sequence of Loading
         What could be added, nothing included.
-    runs : int
     bare : float
         Inertia of the bare body, roughly [kg or kg m^2].
     error : float

@@ -35,8 +35,6 @@ def page(
     ----------
     data : mapping
         From `live.twin.moving`.
-    plant : Plant
-    headline : str
     cautions : sequence of str
         What stands against relying on it.
     share : str

@@ -54,7 +54,6 @@ def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lan
     ----------
     rig : Rig
         Completed, as `rig.completion.completed` gives it.
-    loop : Loop
     task : Task
         Where the loop is switched on, and for how long the rigs of the fit run.
     others : mapping of str to array, shape (lanes,)

@@ -39,7 +39,6 @@ class LogHeader:
         The law as `upright.laws.as_values` gives it, for a replay; anything else that JSON can hold is kept and shown.
     coordinates : tuple of (str, str)
         Name and unit of each measured coordinate, in the plant's order. A row has the counts of each first.
-    command_unit : str
     period : float
         Of the control tick [s].
     references : tuple of (str, str)

@@ -126,7 +126,6 @@ class RunFile:
     ----------
     stream
         Binary file with ``write``, ``tell`` and ``flush``.
-    header : LogHeader
     """
 
     def __init__(self, stream: Any, header: LogHeader) -> None:

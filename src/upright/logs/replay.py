@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 PATIENCE = (20.0, 2e-3)
 """Longest time that a logged rule may take, by itself and for each row [s]; a rule takes some 20 us for a row."""
 
+MEMORY = 4 << 30
+"""Most that it may take besides, where the system holds a process to that: not on Windows and macOS [bytes]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
@@ -48,7 +51,6 @@ class Replay:
         Commands that are not the logged ones to the last bit.
     largest : float
         Of their distances, in the command's unit.
-    first : Difference or None
     passed_over : int
         Rows in which the law commanded, behind rows that were dropped: what it remembered there is not known.
     """
@@ -77,7 +79,6 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
 
     Parameters
     ----------
-    log : RunLog
     law : Law or Rule, optional
         Instead of the logged one.
 
@@ -160,7 +161,8 @@ def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> A
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-c", "from upright.logs.replay import answer; answer()"],
-            input=pickle.dumps((as_values(law), stretches, file)), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            input=pickle.dumps((MEMORY, as_values(law), stretches, file)),
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}, timeout=deadline, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -181,7 +183,11 @@ _COMMANDS, _REFUSED = b"=", b"!"
 
 def answer() -> None:
     """In the process of a logged rule: its commands, or why there are none, for what comes in."""
-    law, stretches, file = pickle.load(sys.stdin.buffer)
+    memory, law, stretches, file = pickle.load(sys.stdin.buffer)
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     try:
         content = _COMMANDS + _commands(of_values(law), stretches, file).tobytes()
     except BadInput as refusal:

@@ -37,8 +37,6 @@ class RunLog:
 
     Attributes
     ----------
-    file : str
-    header : LogHeader
     columns : dict of str to array, shape (rows,)
         int64 where numbers are whole, float64 else; NaN where the loop's number was none, such as an infinite command.
     events : tuple of RunEvent

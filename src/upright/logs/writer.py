@@ -50,7 +50,6 @@ class LogWriter:
     ----------
     path : path
         File to write (MCAP); there must be none yet.
-    header : LogHeader
     rows : int
         Rows that may wait for the process; what comes while so many wait is dropped, and counted.
 

@@ -211,8 +211,6 @@ class Regenerated:
 
     Attributes
     ----------
-    name : str
-    locus : Locus
     ratios : array, shape (2,)
         By which factors R falls, as the differences of the sets tell without any fit.
     printed, again : tuples of arrays, shape (n,)

@@ -167,7 +167,6 @@ def counts(printed: str, answers: int, *, of: int = 1) -> range:
     ----------
     printed : str
         As printed, since its decimals say how it was rounded: ``"3.10"`` is not ``"3.1"``.
-    answers : int
     of : int
         1 for a mean, 100 for a percentage.
     """
@@ -213,7 +212,6 @@ class Bound:
 
     Attributes
     ----------
-    answers : int
     gain : tuple of float
         Smallest and largest mean gain that rounds as printed.
     t : tuple of float

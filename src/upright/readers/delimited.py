@@ -36,8 +36,8 @@ def layout(source: Source, text: str | None = None) -> TextTable:
     first = next((i for i, line in enumerate(lines) if begins_with_number(line)), -1)
     if first < 0:
         raise source.bad(
-            "expected rows of numbers under at most one line of names, got none;"
-            f" readable are {', '.join(reader.files for reader in READERS.sound().values())}",
+            "there are no rows of numbers, with at most one line of names above them;"
+            f" formats that can be read: {', '.join(reader.files for reader in READERS.sound().values())}",
             line=1,
         )
     above = [i for i in range(first) if lines[i].strip()]

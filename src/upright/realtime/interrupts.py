@@ -1,21 +1,30 @@
-"""Ctrl-C while something must be done to its end: a rig zeroed, its log closed, its verdict said."""
+"""Signals while something must be done to its end: a rig zeroed, its log closed, its verdict said."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+
+INTERRUPT = (signal.SIGINT,)
+ENDING: tuple[signal.Signals, ...] = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGBREAK")
+    if hasattr(signal, name)
+)
+"""By which a person or a system ends a program or, with Ctrl-Z, leaves it standing where it is."""
 
 
 @contextmanager
-def no_interrupt() -> Generator[None]:
-    """Ignore SIGINT meanwhile, in this process and in those that it starts; nothing in a thread, which gets none."""
+def ignoring(signals: Sequence[signal.Signals] = INTERRUPT) -> Generator[None]:
+    """Ignore signals meanwhile, in this process and in those that it starts; nothing in a thread, which gets none."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = {each: signal.signal(each, signal.SIG_IGN) for each in signals}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for each, handler in before.items():
+            signal.signal(each, handler)

@@ -55,7 +55,6 @@ class Jitter:
         Ticks that were late: see `realtime.pace`.
     work : array, shape (N,)
         Time that the work of each tick took [s].
-    standing : LoopPriority
     stolen : float
         Time for which the host of a virtual machine gave its processors to others meanwhile, over all of them [s].
     """

@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import pickle
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection, wait
@@ -18,7 +19,7 @@ from typing import Any
 
 from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import of_values
-from upright.realtime.interrupts import no_interrupt
+from upright.realtime.interrupts import ENDING, ignoring
 from upright.realtime.pace import Pace, Virtual, WallClock
 from upright.realtime.priority import step_forward
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
@@ -27,6 +28,9 @@ from upright.rigs.protocol import Capabilities, Fault, Mode
 _READINGS = 8
 _FIELDS = 8
 _POLL = 0.05  # s between two looks of the parent
+DEAF = 2.0
+"""How long the parent may not look before the loop ends, since nobody can stop it then [s]: it was itself stopped, or
+waits for a terminal that takes nothing more."""
 _PR_SET_PDEATHSIG = 1  # of linux/prctl.h
 BY_HAND = "Stopped by hand."
 
@@ -73,7 +77,6 @@ def run_in_process(
 
     Parameters
     ----------
-    order : RunOrder
     watch : callable
         Shown the state some twenty times a second; answers with a sentence when it wants the run to end.
     paced : bool
@@ -91,28 +94,29 @@ def run_in_process(
         raise BadInput(f"this run cannot be sent to a process of its own ({error}); run it inline.") from None
     memory = context.RawArray("d", _FIELDS + 1 + _READINGS)
     phase = context.RawArray("c", 201)
-    stop = context.RawValue("b", 0)
+    stop, looks = context.RawValue("b", 0), context.RawValue("q", 0)
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(
-        target=_child, args=(os.getpid(), order, memory, phase, stop, theirs, paced), name="upright loop"
+        target=_child, args=(os.getpid(), order, memory, phase, stop, looks, theirs, paced), name="upright loop"
     )
-    with no_interrupt():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
+    with ignoring():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
         child.start()
     theirs.close()
     window = _Window(memory, phase)
     answer: Any = None
     try:
         while not wait([ours, child.sentinel], _POLL):
+            looks.value += 1
             _ask(stop, watch, window)
         answer = ours.recv() if ours.poll(1.0) else None
     except EOFError:
         answer = None
     except KeyboardInterrupt:
-        with no_interrupt():  # a second one must not lose the verdict
+        with ignoring():  # a second one must not lose the verdict
             stop.value = 1
             answer = _last(ours)
     finally:
-        with no_interrupt():
+        with ignoring():
             stop.value = 1
             child.join(10.0)
             if child.is_alive():
@@ -148,21 +152,23 @@ def _ask(stop: Any, watch: Callable[[RunState], str], window: _Window) -> None:
 
 
 def _child(
-    parent: int, order: RunOrder, memory: Any, phase: Any, stop: Any, pipe: Connection, paced: bool
+    parent: int, order: RunOrder, memory: Any, phase: Any, stop: Any, looks: Any, pipe: Connection, paced: bool
 ) -> None:  # fmt: skip
     import signal
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _interrupt_once)  # to be ended is to be zeroed first
+    for each in ENDING:  # to be ended is to be zeroed first; Ctrl-C is the parent's affair
+        signal.signal(each, signal.SIG_IGN if each == signal.SIGINT else _interrupt_once)
     _end_with_parent()
-    window, orphan = _Window(memory, phase), _orphaned(parent)
+    window, orphan, deaf = _Window(memory, phase), _orphaned(parent), _deaf(looks)
     if orphan():
         return  # before anything is opened
 
     def stopped() -> str:
         if stop.value:
             return BY_HAND
-        return "The program that started the loop is gone." if orphan() else ""
+        if orphan():
+            return "The program that started the loop is gone."
+        return f"The program that started the loop has not looked at it for {DEAF:g} s." if deaf() else ""
 
     def clock(about: Capabilities) -> tuple[Pace, str]:
         if not paced:
@@ -188,7 +194,8 @@ def _interrupt_once(_signal: int, _frame: object) -> None:
     """A second signal must not interrupt the zeroing that the first one began."""
     import signal
 
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for each in ENDING:  # not SIG_IGN, of which Python complains where a second one has come by now
+        signal.signal(each, lambda _signal, _frame: None)
     raise KeyboardInterrupt
 
 
@@ -203,6 +210,19 @@ def _end_with_parent() -> None:
         import signal
 
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, ctypes.c_ulong(signal.SIGTERM))
+
+
+def _deaf(looks: Any, clock: Callable[[], float] = time.monotonic) -> Callable[[], bool]:
+    """Whether the parent has stopped looking; evaluated at every tick."""
+    last, since = -1, 0.0
+
+    def deaf() -> bool:
+        nonlocal last, since
+        if looks.value != last:
+            last, since = looks.value, clock()
+        return clock() - since > DEAF
+
+    return deaf
 
 
 def _orphaned(parent: int) -> Callable[[], bool]:

@@ -13,7 +13,7 @@ from typing import Any
 from upright.errors import RigStopped, UprightError
 from upright.laws import Law, Rule, as_values
 from upright.logs import LogHeader, LogWriter
-from upright.realtime.interrupts import no_interrupt
+from upright.realtime.interrupts import ENDING, ignoring
 from upright.realtime.pace import Pace, Virtual
 from upright.rigs.board import SENTENCES, fault_text
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, Tick
@@ -49,11 +49,8 @@ class RunOrder:
         Makes the stage, where the run will be.
     law : dict of str to any
         As `upright.laws.as_values` gives it.
-    seconds : float
-    mode : Mode
     check : bool
         Whether a pulse is given first.
-    log : Path
     rig_text : str
         Of the rig's file, for the log.
     references : tuple of (str, str)
@@ -115,7 +112,6 @@ class RunEnd:
         Of the loop.
     stopped : str
         Why it ended early, as a sentence; empty when it ran to its end.
-    faults : Fault
     about : Capabilities or None
         Capabilities that the rig reports; None when it did not answer.
     held : Limits or None
@@ -173,8 +169,6 @@ def carry_out(
 
     Parameters
     ----------
-    order : RunOrder
-    law : Law or Rule
     show : callable
         Called with the state at every tick; has to be quick.
     stopped : callable
@@ -216,12 +210,12 @@ def carry_out(
     except RigStopped as stop:
         end["stopped"] = str(stop)
     except KeyboardInterrupt:
-        with no_interrupt():
+        with ignoring(ENDING):
             end["stopped"] = "Stopped by Ctrl-C or a signal."
             with suppress(RigStopped):
                 beside.give_up(Fault.STOP, end["stopped"])
     finally:
-        with no_interrupt():
+        with ignoring(ENDING):
             if not finished:
                 beside.rig.estop()
             beside.rig.close()

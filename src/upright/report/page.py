@@ -68,7 +68,6 @@ class Table:
 
     Attributes
     ----------
-    caption : str
     headings : tuple of str
     rows : tuple of tuple of str
     numbers : tuple of int
@@ -100,7 +99,6 @@ class Picture:
         Unique in its chapter; ids inside the drawing begin with it.
     draw : callable or str
         Gives the matplotlib figure, when somebody looks; or its markup.
-    caption, description : str
     interactive : callable or str
         Gives what a page on a screen draws in its place, from `report.interactive`; nothing when empty.
     """
@@ -143,7 +141,6 @@ class Live:
     ----------
     markup : str
         The page.
-    description : str
     """
 
     markup: str
@@ -160,7 +157,6 @@ class Part:
 
     Attributes
     ----------
-    title : str
     content : tuple of Block
     key : str
         Anchor on the page; its number when empty.
@@ -226,12 +222,10 @@ class Chapter:
 
     Attributes
     ----------
-    title : str
     verdict, detail : str
         What was learned, in a sentence; and how far it can be trusted.
     sound : bool
         Whether the verdict is one to build on.
-    question : str
     parts : tuple of Part
     warnings : tuple of str
     steps : tuple of Step
@@ -297,7 +291,6 @@ def resting_on(chapter: Chapter, basis: Basis, performed: str = "") -> Chapter:
 
     Parameters
     ----------
-    chapter : Chapter
     basis : Basis
         The model that its results rest on.
     performed : str
@@ -331,7 +324,6 @@ class Book:
 
     Attributes
     ----------
-    title : str
     facts : tuple of (str, str)
         For the cover: what was run, on which rig, when, by which program.
     chapters : tuple of Chapter

@@ -26,7 +26,6 @@ def completed(
 
     Parameters
     ----------
-    rig : Rig
     entries : mapping of str to Entry, optional
         Options of the command line; None is none.
     vendor : str, optional

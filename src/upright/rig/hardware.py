@@ -105,9 +105,9 @@ class Hardware:
             f"{meaning_of(n)} ({' or '.join(w for w in (wanted[n], place_of(n)) if w)})" for n in missing
         )
         raise BadInput(
-            f"{who} needs what neither the study nor its fit says: {missing_numbers}. "
-            f"{'Give it as shown, or write it' if any(wanted.values()) else 'Write it'} into the study and identify "
-            f"again; {sheet} takes a data sheet by name ({vendors}) where the rig is one of those."
+            f"{who} needs numbers that neither the study nor its fit has: {missing_numbers}. "
+            f"{'Give the option, or write the key' if any(wanted.values()) else 'Write them'} into the study and "
+            f"identify again; {sheet} takes the data sheet of an {vendors}."
         )
 
     def unlike(self, other: Hardware) -> tuple[str, ...]:

@@ -186,8 +186,8 @@ class Rig(Shown):
     def _number(self, name: str) -> float:
         if name not in self.hardware.entries:
             raise BadInput(
-                f"{self.name or 'the rig'} lacks a number that is needed, the {meaning_of(name)}; give it to "
-                f"rig.replace, or write {place_of(name)} into its study."
+                f"{self.name or 'the rig'} has no {meaning_of(name)}, which is needed; give it to rig.replace, or "
+                f"write {place_of(name)} into its study."
             )
         return self.hardware.entries[name].value
 

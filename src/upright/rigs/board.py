@@ -76,12 +76,7 @@ def fault_text(faults: Fault) -> str:
 
 
 class Board:
-    """A `LiveRig` made of a port.
-
-    Parameters
-    ----------
-    port : Port
-    """
+    """A `LiveRig` made of a port."""
 
     def __init__(self, port: Port) -> None:
         self.port = port
@@ -260,6 +255,8 @@ class Board:
             put = min(max(math.floor(command / c.step + 0.5) * c.step, -most), most)
             self._full = self._full + c.period if abs(put) >= most else 0.0
         self.port.write(put)
+        if self._mode in (Mode.IDLE, Mode.FAULT):
+            self.port.enable(False)  # to a line that lost it, too
         self._applied = put
         self._time = self.port.advance()
         self._before, self._counts = self._counts, self.port.read()

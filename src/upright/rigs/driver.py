@@ -23,12 +23,12 @@ class Connection:
     ----------
     kind, name : str
         As RIG.toml calls driver and rig; the name may be empty.
-    port : str
-    record : Path or None
     zero : str
         Equilibrium at which the encoders are zeroed.
     board : mapping of str to any
         What [board] says; all that the other keys of RIG.toml do not.
+    reversed : set of str
+        Coordinates whose encoders count the other way round.
     model, truth : Rig
         The rig as it is known, and what a simulated one of it truly is.
     """
@@ -41,6 +41,7 @@ class Connection:
     record: Path | None = None
     zero: str = ""
     board: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    reversed: frozenset[str] = frozenset()
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -50,8 +51,10 @@ class Connection:
     def capabilities(self) -> tuple[Capabilities, dict[str, Any]]:
         """Those of a board with this rig at it, and what else [board] says."""
         rest = dict(self.board)
+        sense = [-1.0 if name in self.reversed else 1.0 for name in self.coordinates]
         about = Capabilities(
-            name=self.name or self.kind, coordinates=self.coordinates, counts=self.model.per_unit,
+            name=self.name or self.kind, coordinates=self.coordinates,
+            counts=tuple(way * n for way, n in zip(sense, self.model.per_unit, strict=True)),
             command_unit=self.model.unit, full_scale=float(rest.pop("full_scale", FULL_SCALE)),
             steps=int(rest.pop("steps", 1 << 15)), period=self.model.period, modes=frozenset({Mode.HOST}),
         )  # fmt: skip

@@ -22,7 +22,6 @@ def energy_risen(model: Rig, t: ArrayLike, q: ArrayLike) -> bool:
 
     Parameters
     ----------
-    model : Rig
     t : array, shape (N,)
         Times from when the command was zero [s]; the drive's delay and lag are waited for.
     q : array, shape (N, coordinates)

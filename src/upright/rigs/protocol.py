@@ -161,8 +161,6 @@ class Tick:
         Of the encoders since they were zeroed.
     applied : float
         Command that the converter really puts out [command unit].
-    mode : Mode
-    faults : Fault
     """
 
     tick: int

@@ -20,6 +20,11 @@ A rig of one's own behind a wire, whose limits nobody may leave out::
     travel = "1.5 rad"
     speed = "20 rad/s"
     start = "0.3 rad"
+
+Where its encoders count otherwise than it is described, per turn or metre, with a minus for the other way round::
+
+    [counts]
+    psi = -2400
 """
 
 from __future__ import annotations
@@ -38,7 +43,7 @@ from upright.study.text import Section, StudyText, toml
 
 KEYS = (
     "kind", "name", "fit", "study", "make", "seed", "vendor", "port", "record", "at", "zero", "limits", "board",
-    "loadings",
+    "loadings", "counts",
 )  # fmt: skip
 _EACH = ("travel", "speed", "start")
 _ALL = ("command", "watchdog", "saturation", "frozen", "twist", "lean")
@@ -75,6 +80,8 @@ class RigFile:
     added, tolerance : tuple of str, float
         Known inertias that experiment 1a bolts to the rig one after the other, as their owner says them, and the
         relative standard uncertainty of a piece.
+    counts : mapping of str to float
+        Signed counts per turn or metre of coordinates whose encoders count otherwise than described.
     """
 
     path: Path
@@ -92,6 +99,7 @@ class RigFile:
     board: Mapping[str, Any] = field(default_factory=dict[str, Any])
     added: tuple[str, ...] = ()
     tolerance: float = 0.0
+    counts: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def hardware(self) -> bool:
@@ -105,7 +113,6 @@ class RigFile:
         ----------
         units : mapping of str to str
             ``"rad"`` or ``"m"`` by coordinate, in the plant's order.
-        command_unit : str
         default : Limits, optional
             For what the file leaves out; of hardware nothing is ever filled in.
 
@@ -151,6 +158,15 @@ class RigFile:
         values = {k: v for k, v in _root(self.path).values.items() if k not in ("fit", "study", "record")}
         values["fit"] = Path(os.path.relpath(fit, path.parent)).as_posix()
         return replace_file(path, "".join(f"{k} = {toml(v, 17)}\n" for k, v in values.items()).encode())
+
+    def with_counts(self, counts: Mapping[str, float]) -> Path:
+        """Write signed counts per turn or metre into the file; everything else stays as its owner wrote it."""
+        lines = [f"{name} = {toml(value, 9)}" for name, value in {**self.counts, **counts}.items()]
+        text = self.path.read_text(encoding="utf-8").rstrip("\n")
+        before, section, after = text.partition("\n[counts]")
+        rest = "".join(f"\n[{part}" for part in after.split("\n[")[1:])
+        before = before if section else text + "\n"
+        return replace_file(self.path, "\n".join([before, "[counts]", *lines, ""]).encode() + rest.encode())
 
     def lean(self, unit: str, default: float) -> float:
         """How far the last coordinate may be from what is held [rad or m]."""
@@ -198,7 +214,12 @@ def read_rig_file(path: Path) -> RigFile:
     seed = root.values.get("seed", 0)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise root.error("seed", f"seed is a whole number from 0 on, got {seed!r}")
-    board, loadings = root.section("board").values, root.section("loadings")
+    board, loadings, counts = root.section("board").values, root.section("loadings"), root.section("counts")
+    if driver.performed and counts.values:
+        raise root.error("counts", f'kind = "{kind}" counts as it is described; leave [counts] out')
+    for name in counts.values:
+        if not counts.number(name, "1", 1.0):
+            raise counts.error(name, "counts per turn or metre are not zero; a minus turns the encoder round")
     loadings.check(("added", "tolerance"))
     tolerance = loadings.number("tolerance", "1", 0.0)
     if not 0 <= tolerance < 1:
@@ -210,6 +231,7 @@ def read_rig_file(path: Path) -> RigFile:
         record=place / texts["record"] if "record" in texts else None, at=texts.get("at", "inverted"),
         zero=texts.get("zero", "hanging"), board=board, tolerance=tolerance,
         added=tuple(str(a) for a in loadings.entries("added")),
+        counts={name: counts.number(name, "1", 1.0) for name in counts.values},
     )  # fmt: skip
 
 

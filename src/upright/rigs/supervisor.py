@@ -95,8 +95,6 @@ class Supervisor:
 
     Attributes
     ----------
-    rig : LiveRig
-    duty : Duty
     event : callable
         Called with ``(time, kind, text)`` of each event.
     stopped : callable
@@ -166,16 +164,27 @@ class Supervisor:
             When it does not come to rest, or does not answer as the model does.
         """
         pulse, expected = self._expected()
-        self._await_rest()
-        self._arm()
-        result = self.rig.self_test(pulse, PULSE)
-        self.rig.stop()
+        result = self.pulse(pulse)
         complaint = result.complaint or unlike(result, expected)
         moves = ", ".join(f"{n} {v:.4g}" for n, v in result.moved.items())
         self.event(self._time, "self-test", f"a pulse of {pulse:.3g} {self.about.command_unit} moved {moves}")
         if complaint:
             self._give_up(Fault.SELF_TEST, complaint)
         return replace(result, complaint="")
+
+    def pulse(self, height: float) -> SelfTest:
+        """How far a resting rig goes under a short command [command unit]; leaves it in IDLE.
+
+        Raises
+        ------
+        RigStopped
+            When it does not come to rest, or passes a limit.
+        """
+        self._await_rest()
+        self._arm()
+        result = self.rig.self_test(height, PULSE)
+        self.rig.stop()
+        return result
 
     def aim(self, law: Law | Rule) -> Law | Rule:
         """The law as it will run from where the rig is now; still in IDLE, so that a log can be opened with it.
@@ -431,13 +440,8 @@ class Supervisor:
             return PULSES[1] * self.held.command, None
         response = None
         for share in PULSES:
-            board = Board(TwinPort(replace(model, scales=()), self.duty.zero))
-            about = board.open()
-            board.clear_fault()
-            board.configure(replace(_free(about), command=self.held.command))
-            board.arm()
-            response = board.self_test(share * self.held.command, PULSE)
-            counts = [abs(v * per) for v, per in zip(response.moved.values(), about.counts, strict=True)]
+            response, per_unit = pulse_response(model, self.duty.zero, share * self.held.command), model.per_unit
+            counts = [abs(v * per) for v, per in zip(response.moved.values(), per_unit, strict=True)]
             if min(counts) >= PLAIN:
                 return share * self.held.command, response
         return PULSES[-1] * self.held.command, response
@@ -480,6 +484,16 @@ class Supervisor:
     def _shown(self, value: float) -> str:
         unit = "rad" if self.duty.model is None else self.duty.model.plant.coordinates[-1].unit
         return f"{math.degrees(abs(value)):.3g} degrees" if unit == "rad" else f"{1e3 * abs(value):.3g} mm"
+
+
+def pulse_response(model: Rig, zero: str, pulse: float) -> SelfTest:
+    """What a model does under a pulse [command unit] where its encoders are zeroed, if nothing limits it."""
+    board = Board(TwinPort(replace(model, scales=()), zero, full_scale=2.0 * max(model.limit, abs(pulse))))
+    about = board.open()
+    board.clear_fault()
+    board.configure(_free(about))
+    board.arm()
+    return board.self_test(pulse, PULSE)
 
 
 def _free_with(model: Rig, at: str, i: int) -> list[float]:

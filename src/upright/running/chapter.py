@@ -99,14 +99,22 @@ def checkup_chapter(checkup: Checkup, rig: str) -> Chapter:
     """What was found on a rig."""
     words = {True: "good", False: "wrong", None: "not looked at"}
     rows = tuple((f.what, f.observed, words[f.good]) for f in checkup.findings)
-    step = (
-        Step("Close a loop on it.", f"upright run --rig {rig} --law design.json --duration 30")
-        if checkup.sound
-        else Step("Mend what is reported above, and look again.", f"upright rig doctor {rig}")
-    )
+    again = f"upright rig doctor {rig}"
+    if checkup.sound and any(f.what == "the drive" for f in checkup.findings):
+        step = Step("Supply on, and try the drive.", again)
+    elif checkup.sound:
+        step = Step("Close a loop on it.", f"upright run --rig {rig} --law design.json --duration 30")
+    elif checkup.written is not None:
+        step = Step(f"The counts are in {rig} now; look again.", again)
+    else:
+        mends = "; ".join(checkup.mends)
+        step = Step(f"Mend it, and look again: {mends}." if mends else "Mend what is above, and look again.", again)
     return Chapter(
         title=f"Check-up of {checkup.name}", verdict=checkup.verdict, sound=checkup.sound, steps=(step,),
-        warnings=(NO_SAFETY,), numbers={"findings": [vars(f) for f in checkup.findings], "verdict": checkup.verdict},
+        warnings=(NO_SAFETY,), numbers={
+            "findings": [vars(f) for f in checkup.findings], "verdict": checkup.verdict, "counts": dict(checkup.counts),
+            "dead_zone": list(checkup.dead_zone),
+        },
         parts=(Part("What was looked at", (Table(caption="", headings=("", "found", ""), rows=rows),)),),
     )  # fmt: skip
 

@@ -1,45 +1,56 @@
-"""Is this rig wired as it is described? Checked before any loop: link, limits, encoders by hand, a small pulse."""
+"""Is this rig wired as it is described? Checked before any loop: link, limits, and the first power-up with a person."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from upright.errors import RigStopped
 from upright.rig import Rig
-from upright.rigs import Board, Fault, LiveRig, TwinPort
-from upright.rigs.board import fault_text
+from upright.rigs import Fault
 from upright.rigs.rigfile import read_rig_file
+from upright.running.power_up import PAUSE, CheckupFinding, FirstPowerUp, Hand
 from upright.running.rig import model_and_truth, stage_of
 
-MOVED = 0.05
-"""How far a hand has to move a coordinate [rad, or 5 mm of a metre]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CheckupFinding:
-    """One thing that was looked at; `good` is None where it was not."""
-
-    what: str
-    observed: str
-    good: bool | None = True
+__all__ = ["Checkup", "CheckupFinding", "check_up"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Checkup:
-    """What was found on a rig."""
+    """What was found on a rig.
+
+    Attributes
+    ----------
+    name : str
+    findings : tuple of CheckupFinding
+    counts : mapping of str to float
+        Signed counts per turn or metre that its encoders have, where those are not the described ones.
+    written : Path or None
+        RIG.toml, where they were written into it.
+    dead_zone : tuple of (float, float)
+        Largest command that did not move the driven body, and smallest that did [command unit]; zeros where no drive
+        was tried.
+    """
 
     name: str
     findings: tuple[CheckupFinding, ...]
+    counts: Mapping[str, float] = field(default_factory=dict[str, float])
+    written: Path | None = None
+    dead_zone: tuple[float, float] = (0.0, 0.0)
 
     @property
     def sound(self) -> bool:
         """Whether a loop may be closed, as far as this can tell."""
         return all(f.good is not False for f in self.findings)
+
+    @property
+    def mends(self) -> tuple[str, ...]:
+        """What is to be mended, in the order in which it was found."""
+        return tuple(f.fix for f in self.findings if f.good is False and f.fix)
 
     @property
     def verdict(self) -> str:
@@ -53,20 +64,22 @@ class Checkup:
 
 
 def check_up(
-    path: Path, *, hand: Callable[[str], bool] | None = None, clear: bool = False, pulse: bool = True
+    path: Path, *, hand: Hand | None = None, clear: bool = False, pulse: bool = True,
+    wait: Callable[[float], object] = PAUSE.wait,
 ) -> Checkup:  # fmt: skip
     """Look at the rig of a RIG.toml.
 
     Parameters
     ----------
-    path : Path
     hand : callable, optional
-        Called with a sentence, to move a coordinate by hand in its positive sense; answers whether that was done.
-        A twin's own hand does it when omitted.
+        Called with a sentence that asks for something to be done, or with a question; answers whether it was done, or
+        yes. A twin's own hand does it when omitted.
     clear : bool
         Whether latched faults are forgotten first.
     pulse : bool
-        Whether the self-test's pulse is given.
+        Whether the drive is tried.
+    wait : callable
+        Lets seconds pass in which nobody speaks to the rig.
 
     Raises
     ------
@@ -77,9 +90,10 @@ def check_up(
     model, _ = model_and_truth(file)
     stage = stage_of(path, balance=False)
     beside, rig, out = stage.supervisor, stage.supervisor.rig, list[CheckupFinding]()
+    steps = FirstPowerUp(beside=beside, model=model, hand=hand, wait=wait)
     try:
         if clear:
-            about = rig.open()
+            rig.open()
             rig.clear_fault()
             rig.close()
         about = beside.prepare()
@@ -90,60 +104,49 @@ def check_up(
         volts, silence = f"{beside.held.command:.4g} {about.command_unit}", f"{1e3 * beside.held.watchdog:.4g} ms"
         held = f"travel {held}; command {volts}; watchdog {silence}"
         out.append(CheckupFinding(what="limits, read back", observed=held))
-        for i, name in enumerate(about.coordinates):
-            out.append(_by_hand(rig, model, i, name, hand))
+        out += steps.by_hand()
         if not pulse or about.replayed:
-            out.append(CheckupFinding(what="a small pulse", observed="not given", good=None))
+            out.append(CheckupFinding(what="the drive", observed="not tried", good=None))
+        elif any(f.good is False for f in out):  # limits are in counts
+            out.append(CheckupFinding(what="the drive", observed="not tried before that is mended", good=None))
         else:
-            if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
-                rig.port.hold(beside.duty.zero)
-                rig.port.let_go()
-            moved = beside.check().moved
-            shown = ", ".join(f"{n} {v:.4g}" for n, v in moved.items())
-            out.append(CheckupFinding(what="a small pulse", observed=shown))
+            out += _of_drive(steps)
     except RigStopped as stop:
-        what = "a small pulse" if beside.faults & Fault.SELF_TEST else "stopped"
+        what = "the drive" if beside.faults & Fault.SELF_TEST else "stopped"
         out.append(CheckupFinding(what=what, observed=str(stop), good=False))
     finally:
         rig.estop()
         rig.close()
-    return Checkup(name=model.name, findings=tuple(out))
+    counts, written = dict(steps.counts), None
+    lines = ", ".join(f"{name} = {value:.6g}" for name, value in counts.items())
+    if counts and hand is not None and file.hardware and hand(
+        f"Shall {path} take the counts that were seen, {lines}? No, if you rather swap channels."
+    ):  # fmt: skip
+        written = file.with_counts(counts)
+    return Checkup(
+        name=model.name, findings=tuple(out), counts=counts, written=written, dead_zone=steps.dead_zone
+    )  # fmt: skip
+
+
+def _of_drive(steps: FirstPowerUp) -> Iterator[CheckupFinding]:
+    """Whatever needs the drive; nothing more once something is wrong with it."""
+    for step in (steps.drive, steps.button, steps.travel, steps.watchdog):
+        wrong = False
+        for finding in step():
+            wrong |= finding.good is False
+            yield finding
+        if wrong:
+            return
 
 
 def _described(model: Rig, period: float, counts: tuple[float, ...]) -> list[CheckupFinding]:
     """Whether the rig is the one that was described."""
     same = math.isclose(period, model.period, rel_tol=1e-3)
     compared = f"{1e3 * period:.4g} ms, described as {1e3 * model.period:.4g} ms"
-    out = [CheckupFinding(what="servo period", observed=compared, good=same)]
-    alike = np.allclose(np.abs(counts), model.per_unit, rtol=1e-6)
-    return [*out, CheckupFinding(what="counts", observed=", ".join(f"{c:.6g}" for c in counts), good=bool(alike))]
-
-
-def _by_hand(
-    rig: LiveRig, model: Rig, i: int, name: str, hand: Callable[[str], bool] | None
-) -> CheckupFinding:  # fmt: skip
-    """One encoder, moved by hand in its positive sense."""
-    unit, per = model.plant.coordinates[i].unit, model.per_unit[i]
-    size = MOVED if unit == "rad" else MOVED / 10
-    before = rig.exchange(0.0)
-    if before.faults:
-        return CheckupFinding(what=f"{name} by hand", observed=fault_text(before.faults), good=False)
-    what = f"{name} by hand"
-    if hand is not None:
-        if not hand(f"Move {name} by hand in its positive sense by some {'degrees' if unit == 'rad' else 'mm'}."):
-            return CheckupFinding(what=what, observed="not moved", good=None)
-    elif isinstance(rig, Board) and isinstance(rig.port, TwinPort):
-        away = np.zeros(2 * len(model.per_unit))
-        away[2 * i] = 2 * size
-        rig.port.hold(next(iter(model.plant.equilibria)), away)
-    else:
-        return CheckupFinding(what=what, observed="it was not moved", good=None)
-    moved = (rig.exchange(0.0).counts[i] - before.counts[i]) / per
-    shown = f"{math.degrees(moved):.3g} degrees" if unit == "rad" else f"{1e3 * moved:.3g} mm"
-    if abs(moved) < size / 10:
-        return CheckupFinding(what=what, observed=f"showed {shown}: not connected, or not this channel", good=False)
-    if moved < 0:
-        return CheckupFinding(
-            what=what, observed=f"showed {shown}: it counts the wrong way, swap its channels", good=False
-        )
-    return CheckupFinding(what=what, observed=f"showed {shown}")
+    alike = bool(np.allclose(np.abs(counts), model.per_unit, rtol=1e-6))
+    return [
+        CheckupFinding(what="servo period", observed=compared, good=same,
+                       fix="" if same else "period in [board], or servo_period of the description"),
+        CheckupFinding(what="counts", observed=", ".join(f"{c:.6g}" for c in counts), good=alike,
+                       fix="" if alike else "[counts], or counts of the description"),
+    ]  # fmt: skip

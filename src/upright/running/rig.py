@@ -38,13 +38,25 @@ def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
         model, truth = make_rig(make.key), make_rig(make.key, file.seed)
         return (replace(model, name=file.name), truth) if file.name else (model, truth)
     known = read_stored_rig(file.known, seed=file.seed)
-    model = completed(known, vendor=file.vendor, who="a run on a rig", form="")
+    model = _counted(completed(known, vendor=file.vendor, who="a run on a rig", form=""), file)
     truth = model
     if file.performed == SIMULATED and file.make:
         truth = make_rig(make_named(file.make, option="make").key, file.seed)
     elif file.performed == SIMULATED and file.seed:
         truth = twin_of(model, file.seed)
     return (replace(model, name=file.name), truth) if file.name else (model, truth)
+
+
+def _counted(model: Rig, file: RigFile) -> Rig:
+    """The rig with the counts that its file corrects."""
+    if not file.counts:
+        return model
+    names = [c.name for c in model.plant.coordinates]
+    if unknown := sorted(file.counts.keys() - set(names)):
+        raise BadInput(f"{file.path}: [counts] has no coordinate '{unknown[0]}'; {nearest(unknown[0], names)}")
+    return model.replace(
+        counts=[abs(file.counts.get(name, n)) for name, n in zip(names, model.counts, strict=True)]
+    )  # fmt: skip
 
 
 def live_rig(file: RigFile, model: Rig, truth: Rig) -> LiveRig:
@@ -57,7 +69,7 @@ def live_rig(file: RigFile, model: Rig, truth: Rig) -> LiveRig:
     """
     to = Connection(
         kind=file.kind, name=file.name, port=file.port, record=file.record, zero=file.zero, board=file.board,
-        model=model, truth=truth,
+        model=model, truth=truth, reversed=frozenset(name for name, n in file.counts.items() if n < 0),
     )  # fmt: skip
     try:
         return DRIVERS[file.kind].open(to)
@@ -86,7 +98,6 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
 
     Parameters
     ----------
-    path : Path
     balance : bool
         Whether an equilibrium is held that nothing holds by itself; else the rig stays where its encoders are zeroed.
     tilt : float

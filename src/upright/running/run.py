@@ -64,7 +64,7 @@ class RunRequest:
 
     def __post_init__(self) -> None:
         if (self.law is None) == (not self.excite and not self.samples):
-            raise BadInput('a run needs a law (--law design.json) or a signal (--excite "sine 0.5 2"), one of them.')
+            raise BadInput('A run needs either a law (--law design.json) or a signal (--excite "sine 0.5 2").')
         if not 0 < self.seconds <= 86_400:
             raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
         if self.mode not in MODES:
@@ -79,14 +79,10 @@ class RigRun:
 
     Attributes
     ----------
-    request : RunRequest
-    file : RigFile
     model : Rig
         As it is known.
-    end : RunEnd
     log : RunLog or None
         None where no loop began.
-    log_path : Path
     basis : Basis
         Of the law, and of the model that the supervisor compared the rig with.
     """
@@ -219,7 +215,6 @@ def run_rig(
 
     Parameters
     ----------
-    request : RunRequest
     folder : Path
         Takes the log.
     watch : callable

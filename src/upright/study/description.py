@@ -34,7 +34,6 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
     ----------
     study : Section
         The whole study.
-    plant : type of Plant
     rig : GreyBox
         As read from the same study.
     logs : collection of str, optional

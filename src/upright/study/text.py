@@ -51,8 +51,8 @@ class StudyText:
             line = at.group(1) if at and at.group(1) else self.text.count("\n") + 1
             what = re.sub(r"\s*\(at .*\)$", "", message)
             raise BadInput(
-                f"{path}, line {line}: this is no TOML ({what[:1].lower()}{what[1:]}); text stands in quotes, as in"
-                ' plant = "furuta", and each key on its own line. Is this a log? Then: upright init LOG'
+                f"{path}, line {line}: this is not TOML ({what[:1].lower()}{what[1:]}). Write text in quotes, as in"
+                ' plant = "furuta", and each key on its own line. If this is a log: upright init LOG'
             ) from None
         except (ValueError, RecursionError):  # a number of 5000 digits, a list in 1000 lists
             raise BadInput(

@@ -300,6 +300,8 @@ class StateSpace(Shown):
         """
         if isinstance(model, cls):
             return model
+        if hasattr(model, "reference_names"):
+            raise BadInput("a linear model of what is controlled is needed, and this is a law.")
         if hasattr(model, "num") and hasattr(model, "den"):
             model = _realised(model)
         if hasattr(model, "A") and hasattr(model, "B"):

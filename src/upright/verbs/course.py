@@ -83,7 +83,7 @@ def lab(
     accept: str | None = None, progress: Progress = silent, ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
-    """Run the experiments of the paper on simulated rigs, and report what they say.
+    """Run the paper's experiments, on simulated rigs or on hardware, and write one report.
 
     Or on hardware: identify, flip, design, hold, swing, report. Every log, study and fit is written to the folder
     for the other verbs, and one report.html tells it all (report.pdf with the pdf extra). Ctrl-C keeps and reports what
@@ -251,7 +251,7 @@ def _ctrl_c() -> Generator[_Pressed]:
 def reproduce(
     *, seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False
 ) -> Answer[Reproduced]:  # fmt: skip
-    """Regenerate the pole tables of the paper from a few numbers, and show its misprints.
+    """Regenerate the paper's pole tables from a few numbers, and show its misprints.
 
     The printed poles lie on an LQR locus: plant and weights are recovered from them, and all poles follow
     again, to less than the print's rounding.
@@ -295,7 +295,7 @@ def survey(
     file: str | os.PathLike[str] | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Ratings | Means | Shares]:  # fmt: skip
-    """Evaluate ratings before and after a course; check printed means and percentages.
+    """Evaluate ratings before and after a course, or check printed means and percentages.
 
     One row per person ('feedback pre', 'feedback post', ...), one row per answer (id, item, time, rating), or what was
     printed: means (concept, pre, post) and percentages, with the number of answers.
@@ -338,8 +338,10 @@ def survey(
     limits = (int(ends[1]), int(ends[2]))
     if isinstance(file, str | os.PathLike):
         file = Path(file)
+        if not file.exists():
+            raise BadInput(f"the sheet {file} does not exist; check the path.")
         sheet, name, command = read_sheet(file, scale=limits), file.name, f"upright survey {typed(file)}"
-    elif hasattr(file, "to_csv"):
+    elif hasattr(file, "to_csv") and hasattr(file, "iloc"):
         sheet, name, command = read_table(file.to_csv(index=bool(file.index.name)), "frame", scale=limits), "frame", ""
     else:
         raise BadInput(f"survey takes a CSV file or a pandas DataFrame, got {type(file).__name__}.")

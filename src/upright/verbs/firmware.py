@@ -87,7 +87,7 @@ def firmware_flash(
     *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None, port: str | None = None,
     out: str | os.PathLike[str] = "upright-firmware", hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
-    """Build the image and write it onto the board: port found, you asked, read back, greeted.
+    """Build the image, write it to a board once you agree, and verify it.
 
     Without a board it ends within seconds.
 
@@ -137,7 +137,7 @@ def firmware_flash(
 def firmware_pins(
     *, board: str = "mega", drive: str = "analog", out: str | os.PathLike[str] | None = None
 ) -> Answer[tuple[Pin, ...]]:
-    """Say which wire goes where, from the table that the firmware is compiled with.
+    """List which wire goes to which pin, from the table that the firmware is compiled with.
 
     Parameters
     ----------

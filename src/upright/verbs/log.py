@@ -179,7 +179,7 @@ def doctor(
     log: Log, *, rig: str | Any = None, html: str | os.PathLike[str] | None = None, pdf: bool = False,
     reader: str | None = None,
 ) -> Answer[Diagnosis]:  # fmt: skip
-    """Say in plain sentences what looks wrong with a log, on which evidence, and what to do.
+    """Say in plain sentences what looks wrong with a log, with the evidence and what to do.
 
     Looks for dead, frozen, wrapping and spiking sensors, lost counts, gaps, jitter, doubled rows, resets of the clock,
     efforts that are none or at their limit, motion before the command, creeping bodies; knowing the rig, also for
@@ -248,10 +248,10 @@ def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]
     from upright.physics import Plant
     from upright.verbs.handover import rig_of
 
-    if rig is None or rig == "":
+    if rig is None:
         return None, None
     if isinstance(rig, str | os.PathLike):
-        return read_known(str(rig), log)
+        return read_known(str(rig), log) if str(rig) else (None, None)
     if isinstance(rig, type) and issubclass(rig, Plant):
         return rig, None
     return rig_of(rig, "doctor", draws=0), None
@@ -405,7 +405,7 @@ def law(
     reference: Sequence[str] | str | None = None, feedforward: Sequence[str] | str | None = None,
     every: int | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[Recovery]:  # fmt: skip
-    """Recover the control law from a closed-loop log: structure, gains, limit, what is left.
+    """Recover the control law from a closed-loop log: structure, gains, limit, and what it leaves unexplained.
 
     P, PI, PD and PID are tried on error and measurement, with plain, two-tap and low-passed differences; the simplest
     that predicts rows held out wins.

@@ -35,7 +35,7 @@ _CONVERTED = (".csv", ".parquet", ".mat")
 )
 @keeps_its_inputs
 def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) -> Answer[RunLog]:
-    """Print what a run's log holds: rig, law, duration, rate, modes, faults, events, what is missing.
+    """Print what a run's log holds: rig, law, duration, rate, modes, faults, events, missing rows.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def _rows_as_text(chunks: Iterator[Fresh]) -> Iterator[str]:
     more="upright log tail run.mcap",
 )
 def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
-    """Print the last row of every chunk as it reaches a log that is being written, and every event.
+    """Follow a log while it is written: the last row of every chunk, and every event.
 
     Begins with the first chunk, and ends when the run ends its log, or with Ctrl-C.
 
@@ -134,7 +134,7 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
 @command(name="log recover", metavars={"out": "FILE"}, more="upright log recover run.mcap -o whole.mcap")
 @keeps_its_inputs
 def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvaged]:
-    """Write the rows of a torn log, up to its first error, to a whole file.
+    """Save the rows of a damaged log, up to its first error, as a valid file.
 
     Every row that is kept was checked; the counts of kept and lost rows are reported. The log itself stays as it is.
 
@@ -217,7 +217,7 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     """,
 )
 def log_replay(log: PathLike) -> Answer[Replay]:
-    """Pass the logged measurements through the logged law; say whether its commands are the same.
+    """Replay the logged law on the logged measurements, and compare its commands bit by bit.
 
     The same to the last bit.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -35,7 +36,7 @@ def simulate(
 
     Parameters
     ----------
-    plant : Plant, Rig, fit or linear model
+    plant : Plant, Rig, fit, study, path of either, or linear model
         Of a rig or a fit its drive, encoders and servo period count as well, where they are known and not given here.
         A linear model in any form, ``(A, B)`` too, runs under gains, a deviation from the point that it holds about.
     law : Gains, array of gains, Law or Rule, optional
@@ -80,7 +81,7 @@ def simulate(
             raise BadInput(f"{name} belongs to a rig, and this is a linear model; leave it out.")
         return _of_linear(linear_model(plant), law, {} if start is None else start, si(seconds, "s"), u, dt, limit)
     rig = _rig(plant)
-    plant = _plant(plant)
+    plant = _plant(plant if rig is None else rig)
     point = _point(plant, law, at)
     if dt is None and rig is not None:
         dt = getattr(law, "period", None) or rig.hardware.value("servo_period", 0.0) or None
@@ -186,11 +187,12 @@ def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
 def _rig(source: Any) -> Rig | None:
     """A rig, or that of a fit; a plant alone has no drive."""
     from upright.rig import Rig
+    from upright.study.load import Study
+    from upright.verbs.handover import rig_of
     from upright.verbs.model.fit import FitAnswer
 
-    if isinstance(source, Rig):
-        return source
-    return source.rig if isinstance(source, FitAnswer) else None
+    stored = isinstance(source, FitAnswer | Study | str | os.PathLike)
+    return source if isinstance(source, Rig) else rig_of(source, "simulate", draws=0) if stored else None
 
 
 def _plant(source: Any) -> Plant:

@@ -152,7 +152,7 @@ def _let_go(start: Start | float | None, rig: Path, *, law: bool) -> float:
 def rig_check(
     *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
 ) -> Answer[Jitter]:
-    """Measure how late this machine wakes a loop, and say whether it holds a rate.
+    """Measure how late this machine wakes a loop, and say whether a rate is safe on it.
 
     The loop has the law and the supervision of a run.
 
@@ -206,19 +206,19 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     prepare=_for_hardware,
     wrong=lambda answer: not answer.chapter.sound,
     more="""
-    Let the rig hang freely, with nobody in its way: the pulse moves it.
+    It asks for what a person does, and says what is wrong and what mends it; docs/build.md is the page to it.
 
     upright rig doctor RIG.toml
     """,
 )
-@keeps_its_inputs
 def rig_doctor(
     rig: str | os.PathLike[str], *, clear: bool = False, pulse: bool = True,
     hand: Callable[[str], bool] | None = None,
 ) -> Answer[Checkup]:  # fmt: skip
-    """Look at a rig before any loop: link, limits, encoders by hand, a small pulse.
+    """Walk through a rig's first power-up: link, limits, encoders by hand, pulses, stop button, travel, watchdog.
 
-    Limits are read back; each encoder is moved by hand.
+    The drive stays off while an encoder is wrong, since every limit is in counts. Counts that a hand has shown are
+    written into RIG.toml when you agree.
 
     Parameters
     ----------
@@ -227,14 +227,15 @@ def rig_doctor(
     clear : bool
         Forget faults that are latched.
     pulse : bool
-        Give a small pulse and compare its answer with the model's.
+        Try the drive: pulses that grow until it moves, stop button, end of travel, watchdog.
     hand : callable, optional
-        Called with a sentence, to move a coordinate by hand; answers whether that was done.
+        Called with a sentence that asks for something to be done, or with a question; answers whether it was done, or
+        yes.
 
     Returns
     -------
     Answer
-        Of a `Checkup`.
+        Of a `Checkup`: `findings`, each with its `fix`; `counts` and `dead_zone` as they were seen.
 
     Raises
     ------

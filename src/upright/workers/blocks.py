@@ -13,7 +13,6 @@ def cut(lanes: int, most: int) -> list[slice]:
 
     Parameters
     ----------
-    lanes : int
     most : int
         Lanes in a block, a multiple of 16. The last block may hold fewer, or one more: a lane alone would run through
         other code than lanes side by side.

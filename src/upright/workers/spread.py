@@ -118,7 +118,6 @@ def spread(
         but those that its item holds or seeds.
     items : sequence
         Sizeable ones: handing one out takes about a millisecond.
-    workers : Workers
     progress : callable, optional
         Called in one line with how many are completed.
     what : str

@@ -34,9 +34,6 @@ def run_by_hand(
 
     Parameters
     ----------
-    stand : TestStand
-    folder : Path
-    progress : callable
     known : sequence of Known
         What earlier experiments say of the body that carries the pendulum: nothing else gives a free swing its scale.
 

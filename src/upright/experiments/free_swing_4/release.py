@@ -69,7 +69,6 @@ def release_log(
         As `freed`.
     release : Release, optional
         From horizontal, its carrier at rest, when omitted; no hand holds an angle better than a degree.
-    seconds : float
     every : int
         Servo periods per logged sample.
     shot : int

@@ -39,9 +39,6 @@ class FrequencyRun:
     ----------
     rig : Rig
         The twin, which knows the truth.
-    make : Make
-    sweep : Sweep
-    answer : FrequencyFit
     folder : Path
         Holds `frequency.csv`, `sweep.csv` and `fit.json`.
     kind : str
@@ -80,8 +77,6 @@ def run_frequency(
     ----------
     rig : Rig or str
         A rig of a make, or the make of which `seed` is taken.
-    seed : int
-    folder : Path
     progress, stopped : callables
         Called with the current step and the share completed; asked between two steps whether to stop.
     weighed : sequence of Known
@@ -175,8 +170,6 @@ def response_of_logs(
     ----------
     sources : sequence of Path
         One study, one response, or logs that repeat one another.
-    request : LogRequest
-    folder : Path
     data : Path, optional
         Folder of a study's logs.
     tell : Progress

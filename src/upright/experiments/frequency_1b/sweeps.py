@@ -58,7 +58,6 @@ class Sweep:
     ----------
     dwells : tuple of Dwell
         Sines, one after the other; empty when all were excited at once.
-    response : FrequencyResponse
     seconds : float
         Time at the rig.
     log : Record
@@ -197,7 +196,6 @@ def broadband(rig: Rig, make: Make, kind: str, *, seed: int = 0) -> Sweep:
 
     Parameters
     ----------
-    rig : Rig
     make : Make
         The rig as designed, from which the command is shaped.
     kind : {"multisine", "sweep"}

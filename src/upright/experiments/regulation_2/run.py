@@ -133,8 +133,6 @@ class Regulation:
         As identified.
     truth : Rig or None
         The twin on which the laws ran, where it was one that is simulated here.
-    task : Task
-    request : RegulationRequest
     attempts : tuple of Attempt
     ways : tuple of Way
         For the recommended set, on the truth, or on the model where there is no truth.
@@ -142,10 +140,8 @@ class Regulation:
         Whether the identification has a covariance.
     source : str
         What `upright regulate` is given to do this again.
-    seed : int
     performed : str
         `basis.SIMULATED` where no rig was driven.
-    interrupted : bool
     seconds : float
         Computing time.
     """

@@ -45,7 +45,6 @@ class LiveStand(TestStand):
 
     Attributes
     ----------
-    file : RigFile
     person : callable
         Called with a request, in a sentence; answers whether it was done.
     watching : callable

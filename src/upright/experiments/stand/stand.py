@@ -151,7 +151,6 @@ class TestStand(ABC):
 
         Parameters
         ----------
-        law : Law or Rule
         at : str
             Equilibrium to hold.
         folder, stem

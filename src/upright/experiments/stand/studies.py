@@ -27,9 +27,6 @@ def write_study(
 
     Parameters
     ----------
-    stand : TestStand
-    path : Path
-    title : str
     runs : sequence of mappings
         As `[[runs]]` has them.
     known : sequence of Known

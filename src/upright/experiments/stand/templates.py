@@ -13,6 +13,9 @@ kind = "serial"
 port = {port}
 study = "study.toml"
 
+# [board]
+# full_scale = 12.0        # command at full output: of an H-bridge its supply [V]
+
 [limits]
 # command = "5 V"          # largest command
 watchdog = "20 ms"         # longest silence of the host

@@ -84,18 +84,15 @@ class SwingUpRun:
     ----------
     model : Rig
         As known.
-    truth : Rig
     log : Record
         Of the encoders under commands put out blindly.
     check : Scales
         What that says of the encoders.
-    law : SwingUp
     ascent : Ascent or None
         None when the encoders lie: then no loop is closed.
     lies : tuple of Lie
     source : str
         File that the model comes from, as typed; empty for the data sheet.
-    folder : Path
     seconds : float
         Computing time.
     performed : str
@@ -184,7 +181,6 @@ def scales_of_log(model: Rig, log: Record, known: Mapping[str, float] | None = N
 
     Parameters
     ----------
-    model : Rig
     log : Record
         Columns named as the coordinates, in any unit or in counts, and the command ``u``, from rest.
     known : mapping of str to float, optional

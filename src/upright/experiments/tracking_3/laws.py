@@ -44,12 +44,10 @@ class Tracker:
 
     Attributes
     ----------
-    name : str
     K : array, shape (states,)
         Gains [command per m or rad, and per m/s or rad/s].
     k_pf : float
         Gain of the reference [command per m or rad].
-    law : Law
     poles : array
         Poles [1/s] of the sampled loop on the rig of the design, those that die within three samples left out.
     requested : array

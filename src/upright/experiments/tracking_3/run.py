@@ -130,7 +130,6 @@ class Tracking:
     folder : Path
         Holds logs, study and fit; the fit itself where only that was given.
     study, fit : Study and Fit, or None where a fit was given.
-    step : Chosen
     sets : tuple of Outcome
         State feedback, strongest last.
     summed : Outcome or None

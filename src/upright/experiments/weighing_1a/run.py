@@ -124,7 +124,6 @@ class Campaign:
         By label.
     added : dict of str to float
         Inertia that was bolted on, by label [kg or kg m^2].
-    loadings : Loadings
     left_out : tuple of str
         Why some logs did not count: friction may leave too few swings.
     truth : mapping of str to float

@@ -90,7 +90,6 @@ def as_c(text: str, entry: str, arrays: Arrays, sizes: Mapping[str, str]) -> str
     ----------
     text : str
         Of a kernel, `simulation.kernel.compiled.source`.
-    entry : str
     arrays : mapping
         Of the entry.
     sizes : mapping of str to str

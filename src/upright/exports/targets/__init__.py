@@ -52,7 +52,6 @@ class RigExport:
 
     Attributes
     ----------
-    rig : Rig
     called : str
         How a command would name what it was read from.
     folder : Path

@@ -64,7 +64,6 @@ def explain(
         one measurement more. Masses, forces and the drive's gain scale together: one of them must be known.
     at : str
         Equilibrium about which it was measured.
-    data : FrequencyResponse
     seed : int
         Of the starts of least squares.
     tell : callable, optional

@@ -36,7 +36,6 @@ class Balance:
 
     Attributes
     ----------
-    plant : type of Plant
     at : str
         Equilibrium about which it was measured.
     data : FrequencyResponse

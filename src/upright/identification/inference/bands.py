@@ -315,10 +315,8 @@ def banded(
     ----------
     plain : RunScore
         Of the run.
-    bands : Bands
     rig : GreyBox
         With every number known.
-    run : Run
     groups : mapping
         What groups of runs share, by label and name.
     own : mapping of str to float

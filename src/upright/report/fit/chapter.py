@@ -70,8 +70,6 @@ def chapter(
 
     Parameters
     ----------
-    fit : Fit
-    title : str
     provenance : mapping, optional
         Where the data came from: file, window, hash by run; texts, lists or further mappings.
     study, folder : str

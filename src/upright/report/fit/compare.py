@@ -47,7 +47,6 @@ class Comparison:
 
     Attributes
     ----------
-    plant : type of Plant
     runs : mapping of str to ComparedRun
     parameters : mapping of str to (mapping of str to Estimate)
         By fit and name.

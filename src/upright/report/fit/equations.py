@@ -26,7 +26,6 @@ def equations(plant: type[Plant], *, zero: Collection[str] = ()) -> str:
 
     Parameters
     ----------
-    plant : type of Plant
     zero : collection of str
         Parameters that are zero in this fit; their terms are left out.
     """

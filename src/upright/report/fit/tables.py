@@ -29,12 +29,10 @@ def parameter_table(
 
     Parameters
     ----------
-    fit : Fit
     truth : mapping of str to float, optional
         What only a twin can tell, for two columns more.
     beside : (str, mapping of str to str), optional
         Heading and cells of one column more.
-    caption : str
     """
     about = fit.model.parameters
     ranges = {a.name: f"{number(a.range[0], 2)} to {number(a.range[1], 2)}" for a in fit.assumptions if _moves(a)}

@@ -23,8 +23,6 @@ class Flashed:
 
     Attributes
     ----------
-    port : str
-    image : Path
     greeting : str
         What the firmware answered afterwards.
     """
@@ -80,8 +78,6 @@ def flash(
 
     Parameters
     ----------
-    board : BoardKind
-    image : Path
     port : str
         Where it is; found where it is empty.
     hand : callable

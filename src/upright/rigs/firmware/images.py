@@ -34,7 +34,6 @@ class Image:
 
     Attributes
     ----------
-    path : Path
     ready : bool
         Whether it came with the package, instead of being built here.
     ceilings : mapping of str to int
@@ -51,7 +50,6 @@ def ceilings_of(limits: Limits, counts: tuple[float, ...], full_scale: float) ->
 
     Parameters
     ----------
-    limits : Limits
     counts : tuple of float
         Per rad or m of each encoder.
     full_scale : float

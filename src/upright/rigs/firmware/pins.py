@@ -56,7 +56,7 @@ def pins(board: BoardKind, drive: str) -> tuple[Pin, ...]:
             out.append(
                 Pin(
                     number=int(number), name=f"P{port[0]}{port[1]}" if port else f"GP{number}", signal=match[1],
-                    device=match[3], terminal=match[4],
+                    device=match[3].replace("Ohm", "Ω"), terminal=match[4].replace("Ohm", "Ω"),
                 )
             )  # fmt: skip
     return tuple(out)

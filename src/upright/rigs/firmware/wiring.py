@@ -17,12 +17,10 @@ _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#
 
 
 def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
-    """SVG: the board at the left, what each pin goes to at the right, a line for each wire.
+    """SVG: the board at the left, what each pin goes to at the right, a line for each wire; below, the motor's supply.
 
     Parameters
     ----------
-    board : BoardKind
-    drive : str
     wires : sequence of Pin
         As `pins` gives them.
     """
@@ -33,6 +31,8 @@ def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
             rows.pop()  # by the cable, or soldered
         if device.startswith("encoder"):
             rows.append((board.logic, "", "supply, and 2.2 kΩ to A and to B where they are open collectors"))
+        if device == "H-bridge":
+            rows.append((board.logic, "", "VCC, its logic's supply, where it has one (BTS7960, VNH5019)"))
         top, colour = y, _COLOURS[k % len(_COLOURS)]
         y += _ROW
         for number, name, terminal in rows:
@@ -53,11 +53,23 @@ def wiring(board: BoardKind, drive: str, wires: Sequence[Pin]) -> str:
             _text(_DEVICE[0] + 10, top + _ROW / 2, device, weight="bold"),
         ]
         y += _GAP
+    board_ends, motor = y - _GAP, "amplifier" if drive == "analog" else "bridge"
+    power = (
+        "motor, past the board", f"supply's plus → fuse → stop button → the {motor}'s supply (B+, VM, Vs)",
+        f"supply's minus → the {motor}'s ground, where all grounds meet", f"the {motor}'s outputs → motor (twisted)",
+    )  # fmt: skip
+    parts.append(
+        f'<rect x="{_DEVICE[0]}" y="{y}" width="{_DEVICE[1]}" height="{len(power) * _ROW}" fill="none" '
+        'stroke="#111111" stroke-width="1.5" stroke-dasharray="5 4" rx="5"/>'
+    )
+    for k, text in enumerate(power):
+        parts.append(_text(_DEVICE[0] + 10, y + _ROW / 2, text, weight="normal" if k else "bold"))
+        y += _ROW
     height, width = y + 8, sum(_DEVICE) + 24
     body = [
         _text(_BOARD[0], 24, f"{board.title}: {DRIVES[drive]}", weight="bold", size=16),
         _text(_BOARD[0], 46, "number on the board, pin of the processor", size=12),
-        f'<rect x="{_BOARD[0]}" y="{_TOP}" width="{_BOARD[1]}" height="{y - _GAP - _TOP}" fill="#f2f2f2" '
+        f'<rect x="{_BOARD[0]}" y="{_TOP}" width="{_BOARD[1]}" height="{board_ends - _TOP}" fill="#f2f2f2" '
         'stroke="#333333" stroke-width="1.5" rx="8"/>',
         _text(_BOARD[0] + 10, _TOP + 18, board.title.split(maxsplit=1)[-1], weight="bold"),
         *lines, *parts,

@@ -57,25 +57,32 @@ class QuanserPort:
         self._encoders, self._output = array("I", encoders), array("I", [output])
         self._line = array("I", [enable_line])
         self._card: Any = None
+        self._watched = False
 
     def open(self) -> Capabilities:
-        """Connect, put the output to zero, and start the board's watchdog."""
+        """Connect, with the output at zero."""
         card = self._kit.HIL()
         card.open(self._board, self._identifier)
-        self._card = card
+        self._card, self._watched = card, False
         self.write(0.0)
         self.enable(False)
-        card.watchdog_start(self._watchdog)
         return replace(self._about, modes=frozenset({Mode.HOST}), virtual=False, hardware=True)
 
     def write(self, command: float) -> None:
         """Put the command out, and tell the watchdog that somebody is there."""
-        self._card.watchdog_reload()
+        if self._watched:
+            self._card.watchdog_reload()
         self._card.write_analog(self._output, 1, array("d", [command]))
 
     def enable(self, on: bool) -> None:
-        """Switch the amplifier's enable line."""
+        """Switch the amplifier's enable line, and its watchdog: nobody feeds one while a person is waited for."""
+        if on:
+            self._card.watchdog_clear()
+            self._card.watchdog_start(self._watchdog)
         self._card.write_digital(self._line, 1, array("b", [int(on)]))
+        if self._watched and not on:
+            self._card.watchdog_stop()
+        self._watched = on
 
     def advance(self) -> float:
         """The loop keeps the time; the sample is taken at once."""
@@ -97,7 +104,6 @@ class QuanserPort:
         if self._card is not None:
             self.write(0.0)
             self.enable(False)
-            self._card.watchdog_stop()
             self._card.close()
             self._card = None
 

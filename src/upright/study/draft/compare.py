@@ -41,7 +41,6 @@ def explained(record: Record, drafts: Mapping[str, str], log: str) -> dict[str, 
 
     Parameters
     ----------
-    record : Record
     drafts : mapping of str to str
         Text of a study of it by plant; one that cannot be read, or has a coordinate without a column, is left out.
     log : str

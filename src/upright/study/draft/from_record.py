@@ -34,7 +34,6 @@ def study_of_record(
 
     Parameters
     ----------
-    record : Record
     plant : type of Plant or Rig, optional
         Recognised from the columns when omitted; a rig's numbers count as `state_rig` says.
     known : mapping of name to number or text, optional

@@ -60,7 +60,7 @@ def design(
     start: Start | None = None, seed: int = 0,
     out: str | os.PathLike[str] | None = None, pdf: bool = False, **on: Unpack[DesignOptions],
 ) -> Answer[Designed]:  # fmt: skip
-    """Find the gains that hold a rig, and what they are worth in the loop a computer runs.
+    """Find gains that stabilise a rig, and evaluate the loop as a computer runs it.
 
     The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
     Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is requested; period, delay and

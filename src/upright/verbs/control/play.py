@@ -28,7 +28,7 @@ def play(
     fit: Any, *, poles: str | Iterable[complex] | None = None, seed: int = 0,
     out: str | os.PathLike[str] | None = None, **on: Unpack[TrialOptions],
 ) -> Played:  # fmt: skip
-    """Make a page in which the identified rig moves: push it, drag its poles, see which rigs of the fit it holds.
+    """Write a page with a live twin: push it, drag its poles, see which rigs of the fit are stabilised.
 
     The rig is simulated in the page, with dry friction, delay, encoder counts and limit; no request leaves it. Beside
     it the rigs that the covariance of the fit allows run under the same law at every change.

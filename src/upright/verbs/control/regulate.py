@@ -50,7 +50,7 @@ def regulate(
     poles: str | Iterable[complex] | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
     workers: Workforce = 1, progress: Progress = silent, **on: Unpack[TrialOptions],
 ) -> Answer[Regulation]:  # fmt: skip
-    """Hold an identified rig upright; say beforehand what each pole set will come to.
+    """Compare pole sets that hold a rig upright: the predicted probability of each, then the runs.
 
     Gains are placed on the numbers identified while the rig hung. What will come is simulated with limit, counts, delay
     and dry friction, on rigs as the fit's covariance allows; the laws then run on a twin, and both are put side by

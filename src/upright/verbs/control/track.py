@@ -49,7 +49,7 @@ def track(
     out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
     **on: Unpack[RigOptions],
 ) -> Answer[Tracking]:  # fmt: skip
-    """Make the far inertia of a flexible shaft follow a step, by state feedback and by PD.
+    """Step the far end of a flexible shaft, by state feedback and by PD.
 
     This is experiment 3: identifies a twin from a few pulses, places the poles of Table 2, sizes the step by effort,
     twist and travel, predicts its figures and runs it; PD control stands beside. With a fit of your own rig the figures

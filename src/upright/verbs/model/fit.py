@@ -164,13 +164,15 @@ class FitAnswer(Answer["Fit"]):
         Of the other log only what the study lists under `unknown` is estimated (its initial state); nothing else is.
         """
         from upright.identification.inference.scoring import predict as score
-        from upright.study.load import load_study
+        from upright.study.load import Study, load_study
 
         rig = self.value.model
         values = {n: p.value for n, p in rig.parameters.items()} | {
             n: e.value for n, e in self.value.estimates.items() if n in rig.parameters
         }
-        if isinstance(other, str | Path) and Path(other).suffix == ".toml":
+        if isinstance(other, Study):
+            study = other
+        elif isinstance(other, str | Path) and Path(other).suffix == ".toml":
             study = load_study(other, fixed=values)
         else:
             from upright.study.draft.from_record import study_of_record

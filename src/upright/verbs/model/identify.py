@@ -130,7 +130,7 @@ def identify(
     Parameters
     ----------
     study : Record, DataFrame, path of a log or of a study (TOML), or Study
-    plant : class of a plant or its name, Rig, FitAnswer or Plant, optional
+    plant : class of a plant or its name, Rig, FitAnswer, Study, path of either, or Plant, optional
         For a log: ``up.Pendulum``, ``"furuta"``; recognised from the columns when omitted. Of a rig or a fit, numbers
         that were given or measured are known, those that were identified or guessed are estimated from where they are,
         and assumed ones stay so.
@@ -254,16 +254,18 @@ def _what_moves(plant: Any, verb: str) -> type[Plant] | Rig | None:
     """The rig or the kind of plant that a log is of."""
     from upright.physics import Plant, find
     from upright.rig import Rig
-    from upright.study.stored_rig import rig_of_plant
+    from upright.study.load import Study
+    from upright.study.stored_rig import read_stored_rig, rig_of_plant
 
     if plant is None or isinstance(plant, Rig):
         return plant
-    if isinstance(plant, str):
-        return find(plant)
-    if isinstance(plant, FitAnswer):
+    if isinstance(plant, FitAnswer | Study):
         return plant.rig
     if isinstance(plant, Plant):
         return rig_of_plant(plant)
+    if isinstance(plant, str | Path):
+        path = Path(plant)
+        return read_stored_rig(path) if path.suffix in (".json", ".toml") or path.is_dir() else find(str(plant))
     if not (isinstance(plant, type) and issubclass(plant, Plant)):
         raise BadInput(
             f"{verb} takes a plant such as up.Pendulum, its name, or a rig or fit, got {type(plant).__name__}."

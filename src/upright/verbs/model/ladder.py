@@ -58,7 +58,7 @@ def ladder(
     data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
     progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> Answer[Ladder]:  # fmt: skip
-    """Grow a model only while it predicts better what it has not seen.
+    """Add terms to a model only while it predicts unseen runs better.
 
     Give guesses of everything the rig might have. Rung after rung is fitted: viscous friction, Coulomb friction, drag,
     stiction, presliding, then the drive's terms, then friction that differs from run to run. Each run is predicted from
@@ -70,7 +70,7 @@ def ladder(
     ----------
     study : path, Study, Record, DataFrame or FitAnswer
         Rig, runs, guesses of everything the rig might have, and rungs of one's own where wanted; or a log.
-    plant : class of a plant or its name, Rig, FitAnswer or Plant, optional
+    plant : class of a plant or its name, Rig, FitAnswer, Study, path of either, or Plant, optional
         For a log: what it is of, as `identify` takes it.
     out : path, optional
         Folder for ladder.json, ladder.html and study.toml, the study of the chosen model.

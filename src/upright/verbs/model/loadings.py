@@ -115,7 +115,7 @@ def plan_inertias(
     radius: Sequence[float | str] | float | str | None = None, target: float | str | None = None,
     out: str | os.PathLike[str] | None = None,
 ) -> Answer[dict[int, tuple[Plan, Plan]]]:  # fmt: skip
-    """Say which masses, where and how often, give the tightest stiffness for the fewest runs.
+    """Plan which masses to add, and how often, for the most accurate stiffness.
 
     The runs are those of experiment 1a. Carts take 0, 0.5, 1, 1.5 or 2 kg; disks take none, two or four masses of 500 g
     on any bolt circle, so that they stay balanced. Every design is compared on the line 1/omega_n^2 = (m_0 + a)/k.

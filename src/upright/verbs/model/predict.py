@@ -46,7 +46,7 @@ def predict(
     model: Any, study: Any, *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
-    """Score other runs with a model that was fitted before.
+    """Predict other runs with a fitted model, and score the prediction.
 
     Every run is scored, whatever its role. What a run lists under ``unknown`` (its initial state, unless it says
     otherwise) is estimated for that run alone; nothing else is. Around each prediction lies a band that should hold 90
