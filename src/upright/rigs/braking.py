@@ -1,11 +1,11 @@
 """How a driven body is stopped within its travel: where braking has to begin, and with what command.
 
 Zero output does not brake: an arm on ball bearings coasts for turns. While the drive obeys, body and pendulum are
-brought to rest as a whole with at most `SHARE` of what the drive can do, and the output goes to zero then. What is at
-rest is ``p = psi' + (M_12/M_11) cos(theta) theta'``, the momentum over the body's inertia, which only drive and friction
-change: a body at rest under a pendulum that falls would be carried on. That takes ``p^2/(2 a)`` and what is travelled
-before the drive answers; then the falling pendulum shakes its body, by ``|M_12|/M_11`` to either side. A pendulum that
-whirls on walks its body farther, as far as dry friction lets it: that is beyond what is looked ahead to here.
+brought to rest as a whole with at most `SHARE` of what the drive can do, and the output goes to zero then. What comes
+to rest is ``p = psi' + (M_12/M_11) cos(theta) theta'``, the momentum over the body's inertia, which only drive and
+friction change: a body at rest under a pendulum that falls would be carried on. That takes ``p^2/(2 a)`` and what is
+travelled before the drive answers; then the falling pendulum shakes its body, by ``|M_12|/M_11`` to either side. One
+that whirls on walks its body farther, as far as dry friction lets it: that is beyond what is looked ahead to here.
 """
 
 from __future__ import annotations
