@@ -21,12 +21,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from upright.control.braking import LONGEST, SPAN, Braking
 from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
 from upright.rig import Rig
 from upright.rigs.board import Board, fault_text
-from upright.rigs.braking import LONGEST, SPAN, Braking
 from upright.rigs.doubts import Doubts
 from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.obedience import LOOKED, energy_risen

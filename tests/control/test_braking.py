@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from benchmarks.hazards.sound import law_for
+from upright.control.braking import GRACE, SHARE
 from upright.errors import RigStopped
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, TwinPort
-from upright.rigs.braking import GRACE, SHARE
 from upright.rigs.supervisor import Duty, Supervisor
 
 TRAVEL = {"furuta": 1.2, "linear": 0.15}

@@ -4,7 +4,7 @@ Zero output does not brake: an arm on ball bearings coasts for turns. While the 
 brought to rest as a whole with at most `SHARE` of what the drive can do, and the output goes to zero then. What comes
 to rest is ``p = psi' + (M_12/M_11) cos(theta) theta'``, the momentum over the body's inertia, which only drive and
 friction change: a body at rest under a pendulum that falls would be carried on. That takes ``p^2/(2 a)`` and what is
-travelled before the drive answers; then the falling pendulum shakes its body, by ``|M_12|/M_11`` to either side. One
+travelled before the drive answers; then the falling pendulum sways its body, by ``|M_12|/M_11`` to either side. One
 that whirls on walks its body farther, as far as dry friction lets it: that is beyond what is looked ahead to here.
 """
 
@@ -17,8 +17,8 @@ from upright.rig import Rig
 
 SHARE = 0.5
 """Of the largest command's deceleration: gains are off by ten per cent, supplies sag, and a law may still push."""
-SHAKEN = 1.5
-"""Times as far as by the model may a pendulum's fall shake its body: masses and lengths are off, and it is not at rest.
+SWAY = 1.5
+"""Times as far as by the model may a pendulum's fall sway its body: masses and lengths are off, and it is not at rest.
 """
 SLOWING = 0.03
 """Time constant by which the body is slowed once the command is no longer at its limit [s]."""
@@ -66,7 +66,7 @@ class Braking:
     def distance(self, momentum: float) -> float:
         """From where braking begins to the farthest [rad or m], for a momentum outwards."""
         v = max(0.0, momentum)
-        return v * self._late + v**2 / (2 * abs(self._per_command) * self._most) + SHAKEN * abs(self._carried)
+        return v * self._late + v**2 / (2 * abs(self._per_command) * self._most) + SWAY * abs(self._carried)
 
     def goes_on(self, momentum: float, first: float) -> bool:
         """Whether to brake on at a momentum, when it was another at first."""
@@ -75,5 +75,5 @@ class Braking:
 
     def command(self, momentum: float) -> float:
         """That brakes it."""
-        asked = -momentum / (SLOWING * self._per_command)
-        return min(max(asked, -self._most), self._most)
+        braking = -momentum / (SLOWING * self._per_command)
+        return min(max(braking, -self._most), self._most)
