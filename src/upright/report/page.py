@@ -141,10 +141,13 @@ class Live:
     ----------
     markup : str
         The page.
+    short : bool
+        Whether half the height will do.
     """
 
     markup: str
     description: str
+    short: bool = False
 
 
 Block = str | Points | Facts | Code | Formula | Table | Picture | Live
