@@ -95,7 +95,7 @@ def answered(case: Case) -> Told:
     ])  # fmt: skip
     predicts, _, loop = fit.answers
     came = predict(fit, rig, [logged(make, "other", "predict", u2[:length], y2[:length])])["other"].fit_percent
-    exact = min(fit_percent(seen, true) for seen, true in zip(y2[:length].T, case.exact[:length].T, strict=True))
+    exact = min(fit_percent(y2[:length, k], case.exact[:length, k]) for k in range(y2.shape[1]))
     told: Told = [(predicts.question, predicts.answer, min(came.values()) >= GOOD)] if exact >= GOOD else []
     for n, e in fit.estimates.items():
         if e.status in ("well determined", "poorly determined", "at bound", "unseen"):

@@ -2,8 +2,8 @@
 
 Everyone gets the same samples, the same model, the same known numbers and the same guesses, and is used as its authors
 advise; the scripts stand beside this one, in `benchmarks/peers`. A run that was held out is predicted with the physics
-frozen and its start refitted, freely from its first sample (the tails: from the start of what was fitted). Extra
-`peers`: `pip install '.[peers]'`.
+frozen and its start refitted, freely from its first sample; a tail from the start of what was fitted, refitted to what
+comes before the samples that count. Extra `peers`: `pip install '.[peers]'`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from benchmarks.measure import Line, page
 
 TWINS, FEW = 20, 8
 """Twins of each kind, and for a peer that takes half a minute for one."""
+TIE = 0.2
+"""Points of fit percent by which two predictions may differ and be as good."""
 STRIBECK = 0.4
 POOR = 0.3
 """Seconds of a twin's motion that tell little."""
@@ -128,9 +130,12 @@ def _tails(peers, tasks, lines, progress) -> list[str]:
     labels = [(task, label) for task in tasks for label in task.held_out]
     body = [f"| | {' | '.join(f'{task.name}, {label}' for task, label in labels)} | seconds |",
             f"|---|{'--:|' * (len(labels) + 1)}"]  # fmt: skip
+    ours: list[float] = []
+    ahead: list[str] = []
     for peer in peers:
         cells: list[str] = []
         seconds: list[float] = []
+        percents: list[float] = []
         for task in tasks:
             progress(f"{peer.name}: {task.name}")
             said = peer.solve(task)
@@ -138,9 +143,14 @@ def _tails(peers, tasks, lines, progress) -> list[str]:
             for label, held in task.held_out.items():
                 percent = fit_percent(held, said.predicted[label])
                 cells.append(" / ".join(f"{p:.1f}" if p > -100 else "< -100" for p in percent))
+                percents.append(float(np.mean(percent)))
         body.append(f"| {peer.name} | {' | '.join(cells)} | {', '.join(f'{s:.2g}' for s in seconds)} |")
         lines.append(Line(contender=f"held out: {peer.name}", note=", ".join(cells)))
-    return body
+        ours = ours or percents
+        better = [k for k, (own, other) in enumerate(zip(ours, percents, strict=True)) if other > own + TIE]
+        ahead += [f"{peer.name} on {labels[k][0].name}, {labels[k][1]}" for k in better]
+    first = f"Better than upright by more than {TIE:g} points: {'; '.join(ahead) or 'nobody'}."
+    return [first, "", *body]
 
 
 def _halves(peers, tasks, lines, progress) -> list[str]:

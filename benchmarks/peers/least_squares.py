@@ -80,9 +80,9 @@ def fitted(task: Task, run: Samples, *, block: float = 0.0) -> tuple[Array, Arra
 
 
 def predict(task: Task, p: Array, run: Samples, start: Array) -> Array:
-    """A run that was not fitted, its start refitted."""
+    """A run that was not fitted, its start refitted to what does not count."""
     scale = np.ones(p.size)
-    of = residual(task, run, scale)
+    of = residual(task, run.before, scale)
     found = least_squares(lambda s: of(np.concatenate([p, s])), start, x_scale="jac", diff_step=1e-5, max_nfev=60)
     return simulated(task, p, found.x, run)
 

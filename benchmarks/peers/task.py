@@ -41,6 +41,12 @@ class Samples:
         """Which samples count."""
         return self.t >= self.t[0] + self.score_from - 1e-9
 
+    @property
+    def before(self) -> Samples:
+        """What a start may be refitted to: the samples before those that count, or all where all count."""
+        first = int(np.argmax(self.scored))
+        return self.part(0, first) if first else self
+
     def part(self, first: int, last: int) -> Samples:
         """Samples from first to before last, timed from zero."""
         return Samples(t=self.t[first:last] - self.t[first], u=self.u[first:last], y=self.y[first:last])

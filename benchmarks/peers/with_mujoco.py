@@ -134,8 +134,9 @@ def answer(task: Task) -> Answer:
     predicted: dict[str, np.ndarray] = {}
     for label, run in task.held_out.items():
         own = sysid.ParameterDict()
-        residual = _problem(task, run, own, start if run.score_from else started(task, run), values)
-        again, _ = _optimum(own, residual, 20)
+        first = start if run.score_from else started(task, run)
+        again, _ = _optimum(own, _problem(task, run.before, own, first, values), 20)
+        residual = _problem(task, run, sysid.ParameterDict(), first, values)
         predicted[label] = _predicted(again, residual, run)
     return Answer(
         values=values, predicted=predicted, seconds=taken, says="nothing",

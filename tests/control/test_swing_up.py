@@ -202,6 +202,8 @@ def oracle(t, y, z, p):
     n = dict(zip(PARAMETERS, p, strict=True))
     q, theta = y[0] * n["scale_q"], y[1] * n["scale_theta"]
     v, w = (n["memory"] * z[2 + i] + (1 - n["memory"]) * (x - z[i]) / n["period"] for i, x in enumerate((q, theta)))
+    if t < n["period"] / 2:  # a first sample has no difference
+        v, w = z[2], z[3]
 
     def upright(angle):
         return math.remainder(angle - math.pi, math.tau)
@@ -236,6 +238,7 @@ def oracle(t, y, z, p):
         mode, bump, u = SWINGING, 0.0, swing
     else:
         u = hold + bump
+    u += n["lost"] * float(np.clip(u / (0.05 * n["limit"]), -1, 1))
     if abs(q) > n["allowed"] or z[4] == TRIPPED:
         mode, u = TRIPPED, 0.0
     return float(np.clip(u, -n["limit"], n["limit"])), (q, theta, v, w, mode, bump, aim, event)

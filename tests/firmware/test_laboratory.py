@@ -119,3 +119,31 @@ def test_a_rig_behind_a_wire_is_identified_held_swung_up_and_let_swing(host, tmp
     assert told["4"]["trusted"]
     assert not misses(told["4"], ("J_p", "b_1", "b_2"))
     assert len(asked) == 4 + len([s for s in sets.values() if s["after"]]) + 2 + 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wiring", "refused"),
+    [({}, ""), ({"gain": -GAIN}, "motor leads swapped"),
+     ({"counts_theta": -COUNTS * 8192 / 16000},
+      "encoder channels of theta swapped; theta: counts per turn 8000 or 8192, not 16000")],
+)  # fmt: skip
+def test_firmware_comes_upright_in_a_minute_or_its_wiring_is_named(host, tmp_path, wiring, refused):
+    given = {**wiring, "gain": wiring.get("gain", GAIN)}
+    arguments = [a for a in plant(TRUTH.parameters(), GAIN) if a.partition("=")[0] not in given]
+    board = host(*arguments, *(f"{name}={value!r}" for name, value in given.items()))
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text(RIG.format(port=board.port), encoding="utf-8")
+    asked: list[str] = []
+    done = up.lab(rig=str(tmp_path / "RIG.toml"), quick=True, out=tmp_path / "out",
+                  ask=lambda sentence: not asked.append(sentence))  # fmt: skip
+    told = done.numbers["experiments"]["quick"]["numbers"]
+    assert len(asked) == 1
+    assert told["refused"] == refused
+    milliseconds, arm, _, theta, *_ = board.state()
+    assert milliseconds < 60_000
+    assert abs(arm) < 2.0  # its travel
+    if not refused:
+        assert told["upright"]
+        assert abs(abs(theta) % (2 * math.pi) - math.pi) < math.radians(10)
+        assert not misses(told["fit"], ("J_d", "J_p", "b_1", "b_2", "actuator.gain"))

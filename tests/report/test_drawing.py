@@ -27,7 +27,7 @@ from upright.report.drawing import (
     swing_figure,
 )
 from upright.report.fit.figures import autocorrelation, fit_figure
-from upright.report.symbols import axis, identifier, mathtext, number, percent, plain, typed, unit, with_error
+from upright.report.symbols import axis, identifier, mathtext, number, percent, plain, slanted, typed, unit, with_error
 
 
 @given(st.integers(2, 20_000), st.integers(0, 100))
@@ -318,3 +318,9 @@ def test_a_path_is_quoted_where_a_shell_would_read_it(path, shown):
 
 def test_an_error_of_zero_is_a_dash():
     assert with_error(2.0, 0.0) == ("2.000", "–")
+
+
+def test_a_symbol_of_a_page_is_text_with_an_upright_subscript():
+    assert slanted("J_d") == "<i>J<sub>d</sub></i>"
+    assert slanted("theta_dot") == "<i>θ\u0307</i>"
+    assert slanted("a<b") == "<span>a&lt;b</span>"

@@ -202,3 +202,35 @@ def test_a_rig_with_a_fit_is_the_same_but_for_its_description(written, tmp_path)
     again = read_rig_file(tmp_path / "out" / "RIG.toml")
     assert again.known.resolve() == (tmp_path / "fit.json").resolve()
     assert (again.kind, again.port, again.seed) == ("serial", "/dev/ttyACM0", 3)
+
+
+def test_counts_are_written_where_nothing_else_changes_and_read_again(written, tmp_path):
+    text = f"# by hand\n{WHOLE}\n[board]\nfull_scale = 12.0  # of the bridge\n"
+    path = written(text).with_counts({"psi": -2400.0})
+    assert path.read_text(encoding="utf-8") == f"{text}\n[counts]\npsi = -2400\n"
+    written(path.read_text(encoding="utf-8") + "\n[loadings]\nadded = []\n").with_counts({"theta": 9600.0})
+    file = read_rig_file(path)
+    assert file.counts == {"psi": -2400.0, "theta": 9600.0}
+    assert "# of the bridge" in path.read_text(encoding="utf-8")
+    assert path.read_text(encoding="utf-8").endswith("\n[loadings]\nadded = []\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (WHOLE + "[counts]\npsi = 0\n", "line 15: counts per turn or metre are not zero"),
+        ('kind = "twin"\nmake = "furuta"\n[counts]\npsi = 2400\n', "line 3: .* counts as it is described"),
+    ],
+)
+def test_counts_that_no_encoder_has_are_refused(written, text, why):
+    with pytest.raises(BadInput, match=why):
+        written(text)
+
+
+def test_a_coordinate_that_the_rig_lacks_has_no_counts(tmp_path):
+    from tests.firmware.test_laboratory import STUDY
+
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text(WHOLE + "[counts]\nphi = 2400\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=r"\[counts\] has no coordinate 'phi'; .*psi"):
+        stage_of(tmp_path / "RIG.toml")

@@ -206,8 +206,10 @@ def test_a_drive_at_its_defaults_does_nothing(block):
 
 
 @pytest.mark.parametrize(
-    "name", ["start", "end", "damping", "standby", "knee", "fade", "relaxation", "droop", "force_limit", "damping_rise"]
-)
+    "name",
+    ["start", "end", "damping", "standby", "knee", "fade", "relaxation", "droop", "force_limit", "damping_rise",
+     "dead_zone"],
+)  # fmt: skip
 def test_a_lane_whose_drive_is_not_a_number_says_so(block, name):
     p = {**BLOCK, **IDLE, "actuator.fade": 1.0, "actuator.knee": 2.0, "actuator.damping": 0.5}
     p |= {f"actuator.{name}": np.array([math.nan, 0.5])}
@@ -346,3 +348,23 @@ def test_a_gain_that_falls_with_the_command(block):
     u = np.repeat([0.2, -1.0, 0.5], 50)
     v = simulate(block, p, [0.0, 0.0], u, 0.02, samples=151)[::50, 1, 0]
     assert np.diff(v) == pytest.approx([1.432 * w / (1 + 0.684 * abs(w)) for w in (0.2, -1.0, 0.5)], abs=1e-12)
+
+
+def test_a_dead_zone_takes_as_much_of_a_command_from_either_side(block):
+    # a free unit mass: what each command of one second adds to the speed; the offset is added before
+    p = {**BLOCK, "m": 1.0, "k": 0.0, "c": 0.0, "actuator.gain": 1.432, "actuator.dead_zone": 0.3}
+    u = np.repeat([0.2, -1.0, 0.5, -0.25], 50)
+    v = simulate(block, p, [0.0, 0.0], u, 0.02, samples=201)[::50, 1, 0]
+    assert np.diff(v) == pytest.approx([0.0, -1.432 * 0.7, 1.432 * 0.2, 0.0], abs=1e-12)
+    shifted = simulate(block, {**p, "actuator.offset": -0.1}, [0.0, 0.0], u, 0.02, samples=201)[::50, 1, 0]
+    assert np.diff(shifted) == pytest.approx([0.0, -1.432 * 0.8, 1.432 * 0.1, -1.432 * 0.05], abs=1e-12)
+
+
+def test_a_sine_through_a_dead_zone_moves_a_mass_as_its_integral_says(block):
+    # momentum of half a period: the integral of what is above the dead zone, by hand
+    lost, size, w, dt = 0.4, 1.0, 2 * math.pi, 1e-3
+    p = {**BLOCK, "m": 1.0, "k": 0.0, "c": 0.0, "actuator.dead_zone": lost}
+    t = np.arange(501) * dt
+    v = simulate(block, p, [0.0, 0.0], size * np.sin(w * t), dt, samples=501)[-1, 1, 0]
+    first = math.asin(lost / size)
+    assert v == pytest.approx((2 * size * math.cos(first) - lost * (math.pi - 2 * first)) / w, abs=2e-3 * size * dt * w)

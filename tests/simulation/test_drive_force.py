@@ -31,6 +31,7 @@ NUMBERS = {
     "fade": {"knee": 0.5, "fade": 0.9},
     "knee of braking": {"knee": 0.5, "damping": 0.5},
     "droop": {"droop": 0.8, "offset": 0.1},
+    "dead zone": {"dead_zone": 0.15, "offset": 0.05, "limit": 0.7},
     "force limit": {"force_limit": 0.6, "slope": 0.4},
     "damping that rises": {"damping_rise": -0.4, "damping": 0.5, "limit": 0.7, "delay": 0.013},
     "all that do not lag": {

@@ -41,11 +41,11 @@ PARAMETERS = (
     "reach", "sharp", "learn", "pause", "centre", "damp",
     "k0", "k1", "k2", "k3",
     "p00", "p01", "p02", "p03", "p11", "p12", "p13", "p22", "p23", "p33",
-    "size", "near", "fast", "away", "fade", "allowed",
+    "size", "near", "fast", "away", "fade", "allowed", "lost",
 )  # fmt: skip
 """In order: servo period and filter; what encoders show over what is true; the rig; pumping; gains; the ellipsoid
 ``x'Px <= size`` of the catch with bounds of its angle and speed; the angle of a fall; what is left of the handover's
-step from sample to sample; the travel."""
+step from sample to sample; the travel; the command that the drive loses."""
 
 
 def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
@@ -54,10 +54,12 @@ def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
     """
     (period, memory, scale_q, scale_theta, M, spin, kappa, J, weight, viscous, dry, gain, limit, reach, sharp,
      learn, pause, centre, damp, k0, k1, k2, k3, p00, p01, p02, p03, p11, p12, p13, p22, p23, p33, size, near, fast,
-     away, fade, allowed) = p  # fmt: skip
+     away, fade, allowed, lost) = p  # fmt: skip
     q, theta = y[0] * scale_q, y[1] * scale_theta
-    v = memory * z[2] + (1.0 - memory) * (q - z[0]) / period
-    w = memory * z[3] + (1.0 - memory) * (theta - z[1]) / period
+    v, w = z[2], z[3]
+    if t > 0.5 * period:  # of a first sample there is no difference
+        v = memory * v + (1.0 - memory) * (q - z[0]) / period
+        w = memory * w + (1.0 - memory) * (theta - z[1]) / period
     s, c = sin(theta), cos(theta)
     phi = theta - pi - 2.0 * pi * floor((theta - pi) / (2.0 * pi) + 0.5)
     value = (
@@ -91,6 +93,7 @@ def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
         u = hold + bump
         if abs(phi) > away:
             mode, bump, u = 0.0, 0.0, swing
+    u = u + lost * min(max(20.0 * u / limit, 0.0 - 1.0), 1.0)  # what is lost is added, about zero by and by
     if abs(q) > allowed or z[4] > 1.5:
         mode, u = 2.0, 0.0
     return (min(max(u, 0.0 - limit), limit),), (q, theta, v, w, mode, bump, aim, event)
@@ -188,6 +191,8 @@ class SwingUp:
         The drive is switched off beyond [m or rad].
     period, gain, limit : float
         As in the model of the rig.
+    lost : float
+        Dead zone of its drive, which the law adds to its command.
     """
 
     body: Body
@@ -205,6 +210,7 @@ class SwingUp:
     period: float
     gain: float
     limit: float
+    lost: float = 0.0
 
     def rule(self, rig: Rig, start: ArrayLike, *, holding: bool = False) -> Rule:
         """The law with the encoders and the converter of a rig.
@@ -276,7 +282,7 @@ def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 
         # half of what would hold the pendulum level, and no wider a swing of the pivot than fits
         reach=min(0.5 * b.weight / abs(b.kappa), 0.3 * room * b.omega**2), sharp=4.0,
         centre=centre**2, damp=1.5 * centre, travel=room, period=model.period, gain=model.gain,
-        limit=model.saturation,
+        limit=model.saturation, lost=model.drive.get("actuator.dead_zone", 0.0),
     )  # fmt: skip
     return replace(law, size=0.8 * sure * _share(law, model))
 

@@ -22,7 +22,7 @@ from upright.experiments.parallel import run_parallel
 from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import TestStand
 from upright.experiments.stand.twin import TwinStand
-from upright.experiments.table import EXPERIMENTS, Experiment, ExperimentInput
+from upright.experiments.table import EXPERIMENTS, QUICK, Experiment, ExperimentInput
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import PAPER, Book, Chapter, Step, as_plain, from_plain
@@ -124,7 +124,7 @@ def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | No
             raise BadInput(f"experiment {name} is for --rig {' or '.join(named[0].makes)}; {make} {has}.")
         wanted |= {e.key for e in named if e in there}
     if not requested:
-        wanted = {e.key for e in there}
+        wanted = {e.key for e in there if e.key != QUICK}
     for e in reversed(there):  # who builds on another comes after it
         if e.key in wanted:
             wanted |= set(_needs(e, make, live))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
+from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import TestStand
 from upright.experiments.weighing_1a.run import kind_of, run_weighing
 from upright.progress import Progress
@@ -15,6 +16,9 @@ from upright.report.page import Chapter
 from upright.report.symbols import typed
 from upright.rig import Rig
 from upright.rig.makes import MAKES, PENDULUMS, SHAFTS
+
+QUICK = "quick"
+"""Key of the one experiment that is made by itself, and only when it is asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,6 +181,14 @@ def _free_swing(at: ExperimentInput) -> tuple[Chapter, bool]:
     return chapter(result), not result.interrupted
 
 
+def _quick(at: ExperimentInput) -> tuple[Chapter, bool]:
+    from upright.experiments.quick.chapter import chapter
+    from upright.experiments.quick.run import run_quick
+
+    assert isinstance(at.stand, LiveStand)  # as `on` has seen to
+    return chapter(run_quick(at.stand, at.folder, at.seed, at.progress, at.stopped)), True
+
+
 def _carries_pendulum(stand: TestStand) -> bool:
     plant = stand.rig.plant
     return "inverted" in plant.equilibria and len(plant.coordinates) == 2
@@ -212,6 +224,11 @@ EXPERIMENTS: tuple[Experiment, ...] = (
         key="4", part_of="4", title="Large free swing", makes=PENDULUMS,
         on=lambda stand: _carries_pendulum(stand) and stand.fit is None, needs=("1a",), live_needs=("1b",),
         seconds=9.0, tell=_free_swing,
+    ),
+    Experiment(
+        key=QUICK, part_of=QUICK, title="A rig in a minute", makes=(),
+        on=lambda stand: isinstance(stand, LiveStand) and _carries_pendulum(stand) and stand.fit is None, needs=(),
+        live_needs=(), seconds=6.0, tell=_quick,
     ),
 )  # fmt: skip
 """In the order in which they are run and reported."""

@@ -15,7 +15,8 @@ LEAST = 1e-12
 """Inertia of what has none [kg m^2], which MuJoCo does not take."""
 _DRIVE = {
     "delay": "dead time of the drive", "offset": "offset of the drive", "knee": "its torque-speed curve",
-    "droop": "its falling gain", "relaxation": "braking that builds up", "damping_rise": "braking by the command",
+    "droop": "its falling gain", "dead_zone": "its dead zone", "relaxation": "braking that builds up",
+    "damping_rise": "braking by the command",
 }  # fmt: skip
 
 

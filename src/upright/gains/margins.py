@@ -53,6 +53,23 @@ class Margins:
     gain_crossings: tuple[tuple[float, float], ...] = ()
     phase_crossings: tuple[tuple[float, float], ...] = ()
 
+    def dead_zone_cycle(self, dead_zone: float) -> tuple[float, float]:
+        """Amplitude of the command [as `dead_zone`] and frequency [rad/s] of the cycle that a dead zone keeps up.
+
+        Of a sine of amplitude A a dead zone d passes the share ``N = 1 - 2/pi (asin x + x sqrt(1 - x^2))``, x = d/A
+        (describing function); a plant that falls by itself swings until N is the least gain that holds it. Without
+        such a gain, or a dead zone, nothing cycles: both are 0.
+        """
+        at = [w for w, factor in self.phase_crossings if math.isclose(factor, self.least_gain, rel_tol=1e-6)]
+        if not (dead_zone > 0.0 and self.least_gain > 0.0 and at):
+            return 0.0, 0.0
+        low, high = 0.0, 1.0  # N falls from 1 to 0 as x grows
+        for _ in range(60):
+            x = (low + high) / 2
+            passed = 1.0 - 2.0 / math.pi * (math.asin(x) + x * math.sqrt(1.0 - x * x))
+            low, high = (x, high) if passed > self.least_gain else (low, x)
+        return dead_zone / low, at[0]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Response:

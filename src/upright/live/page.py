@@ -50,16 +50,18 @@ def page(
     """
     from markupsafe import Markup
 
-    style = _file("play.css")
-    known = (
-        f"const DATA = {_json({k: v for k, v in data.items() if k != 'outline'})};\nconst OUTLINE = {data['outline']};"
-    )
-    parts = [*(path.read_text(encoding="utf-8") for path in SCRIPTS), known, "/* the page begins */", _file("play.js")]
+    style = page_source("play.css")
+    numbers_of = in_script({k: v for k, v in data.items() if k != "outline"})
+    known = f"const DATA = {numbers_of};\nconst OUTLINE = {data['outline']};"
+    scripts = [*(path.read_text(encoding="utf-8") for path in SCRIPTS), page_source("drawing.js")]
+    parts = [*scripts, known, "/* the page begins */", page_source("play.js")]
     script = "\n".join(parts)
     view, picture = still(plant, [*data["start"]][::2])
     driven = data["coordinates"][data["moved"]]["meaning"].rpartition(" of the ")[2]
     zero = "; ".join(f"{c['name']}: {c['meaning']}" for c in data["coordinates"])
-    allowed = f"script-src {_hash(script)} 'wasm-unsafe-eval' blob:; worker-src blob:; style-src {_hash(style)}"
+    allowed = (
+        f"script-src {source_hash(script)} 'wasm-unsafe-eval' blob:; worker-src blob:; style-src {source_hash(style)}"
+    )
     return rendered(
         "upright.live", "play.html",
         policy=f"default-src 'none'; {allowed}",
@@ -96,15 +98,16 @@ def still(plant: Plant, q: Sequence[float]) -> tuple[str, str]:
     return f"{-1.1 * far:.4g} {-1.15 * high:.4g} {2.2 * far:.4g} {2.3 * high:.4g}", "".join(drawn)
 
 
-def _file(name: str) -> str:
+def page_source(name: str) -> str:
+    """A script or a style of this room."""
     return files("upright.live").joinpath(name).read_text(encoding="utf-8")
 
 
-def _json(data: Mapping[str, Any]) -> str:
+def in_script(data: Mapping[str, Any]) -> str:
     """JSON that may stand inside a script."""
     return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def _hash(text: str) -> str:
+def source_hash(text: str) -> str:
     """A source expression of a content-security policy that allows exactly this text."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -2,58 +2,18 @@
 "use strict";
 
 (() => {
-  const twin = new Twin(DATA), $ = (id) => document.getElementById(id), n = twin.n, SVG = "http://www.w3.org/2000/svg";
+  const twin = new Twin(DATA), $ = (id) => document.getElementById(id), n = twin.n;
   const DEG = 180 / Math.PI, last = n - 1;
-  const make = (tag, attributes, parent) => {
-    const e = document.createElementNS(SVG, tag);
-    for (const k in attributes) e.setAttribute(k, attributes[k]);
-    parent?.append(e);
-    return e;
-  };
+  const make = RigDrawing.make;
   const shown = (x, unit) => (unit === "rad" ? `${(x * DEG).toFixed(1)}°` : `${(x * 100).toFixed(1)} cm`).replace("-", "\u2212");
-  const colour = (name) => {
-    const i = DATA.coordinates.findIndex((c) => c.name === name);
-    return i < 0 ? "var(--line-strong)" : `var(--q${i % 4})`;
-  };
 
   // --- the rig ---------------------------------------------------------------------------------------------------
-  const view = (() => {
-    const at = [DATA.start.filter((_, i) => i % 2 === 0), DATA.coordinates.map(() => 0)];
-    const points = at.flatMap((q) => OUTLINE(q)).flatMap(([, p]) => p);
-    const flat = points.every(([, y]) => Math.abs(y) < 1e-12);
-    const [a, e] = flat ? [0, 0] : [25 / DEG, 20 / DEG];
-    const project = ([x, y, z]) => [
-      x * Math.cos(a) + y * Math.sin(a),
-      -(z * Math.cos(e) + (y * Math.cos(a) - x * Math.sin(a)) * Math.sin(e)),
-    ];
-    const far = Math.max(...points.map((p) => Math.hypot(...p)));
-    const height = Math.max(...points.map((p) => Math.abs(p[2])), far / 2);
-    return { project, box: [-far * 1.1, -height * 1.15, far * 2.2, height * 2.3] };
-  })();
+  const view = RigDrawing.view(OUTLINE, [DATA.start.filter((_, i) => i % 2 === 0), DATA.coordinates.map(() => 0)]);
   const drawing = $("rig");
   drawing.setAttribute("viewBox", view.box.join(" "));
   drawing.replaceChildren();
-  const unit = view.box[2] / 100;
-  const lines = OUTLINE(DATA.coordinates.map(() => 0)).map(([name, points]) => {
-    const line = make("polyline", {
-      fill: points.length > 4 && name ? "var(--raised)" : "none", stroke: colour(name), "stroke-width": unit * (name ? 1.8 : 0.7),
-      "stroke-linecap": "round", "stroke-linejoin": "round", "stroke-dasharray": name || points.length < 4 ? "none" : `${unit * 2} ${unit * 2}`,
-    }, drawing);
-    if (!name || points.length > 2) return { line };
-    const joint = make("circle", { r: unit * 1.5, fill: "var(--paper)", stroke: "var(--ink)", "stroke-width": unit * 0.6 }, drawing);
-    return { line, joint };
-  });
-  const weight = make("circle", { r: unit * 2.4, fill: colour(DATA.coordinates[last].name) }, drawing);
-  const draw = () => {
-    const x = twin.state();
-    OUTLINE(x.filter((_, i) => i % 2 === 0)).forEach(([, points], i) => {
-      const flat = points.map((p) => view.project(p));
-      lines[i].line.setAttribute("points", flat.map((p) => p.map((v) => v.toPrecision(5)).join(",")).join(" "));
-      const at = (c, [a, b]) => { c.setAttribute("cx", a); c.setAttribute("cy", b); };
-      if (lines[i].joint) at(lines[i].joint, flat[0]);
-      at(weight, flat[flat.length - 1]);
-    });
-  };
+  const rig = new RigDrawing(drawing, OUTLINE, DATA.coordinates.map((c) => c.name), view);
+  const draw = () => rig.draw(twin.state().filter((_, i) => i % 2 === 0));
 
   // --- what happened: the last ten seconds ------------------------------------------------------------------------
   const SECONDS = 10, traces = $("traces"), history = [];

@@ -1,9 +1,13 @@
 """Numbers that every drive has besides the plant's own parameters, and the force it gives at measured speeds.
 
 ``force = clip(F_c(lag(delay(gain w / (1 + droop |w|)))) on(t) - slope v, force_limit) - B`` with
-``w = clip(u, limit) + offset``: the drive is alive, ``on``, from `start` to `end`; F_c loses `fade` for each unit of
-speed beyond `knee`; and the braking ``B``, `damping` and `damping_rise` for each unit of command while the drive is
-alive and commanded and `standby` until it trips, times the speed, needs `relaxation` to build up and to fade.
+``w = sign(c) max(|c| - dead_zone, 0)`` and ``c = clip(u, limit) + offset``: the drive is alive, ``on``, from `start` to
+`end`; F_c loses `fade` for each unit of speed beyond `knee`; and the braking ``B``, `damping` and `damping_rise` for
+each unit of command while the drive is alive and commanded and `standby` until it trips, times the speed, needs
+`relaxation` to build up and to fade.
+
+An H-bridge is this with what it is already called: its dead zone; PWM steps, the `converter` of a rig; back-EMF, the
+`slope` (k_t k_e/R of a motor on voltage); a supply that sags under its own current, `droop`.
 """
 
 from __future__ import annotations
@@ -61,6 +65,7 @@ ACTUATOR = {
     "actuator.damping_rise": DriveNumber(
         "force per speed per command", "damping added for each unit of command; negative takes away", 0.0
     ),
+    "actuator.dead_zone": DriveNumber("command", "command that is lost to either side", 0.0, True),
 }
 """By name, in the order of the kernel."""
 
@@ -94,6 +99,7 @@ def drive_force(plant: type[Plant], values: Mapping[str, float], u: Array, v: Ar
         command = np.interp(k - a["delay"] / dt, k, np.clip(u[i], -a["limit"], a["limit"]) + a["offset"])
         commanded = np.interp(k - a["delay"] / dt, k, (u[i] != 0.0).astype(np.float64)) * on
         size = np.interp(k - a["delay"] / dt, k, np.abs(np.clip(u[i], -a["limit"], a["limit"]))) * on
+        command = np.sign(command) * np.maximum(np.abs(command) - a.get("dead_zone", 0.0), 0.0)
         drooping = command / (1.0 + a["droop"] * np.abs(command))
         force = a["gain"] * _lagging(drooping, a["lag"] / dt, float(drooping[0]))
         beyond = np.maximum(np.sign(force) * speed - a["knee"], 0.0)

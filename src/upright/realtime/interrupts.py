@@ -27,4 +27,4 @@ def ignoring(signals: Sequence[signal.Signals] = INTERRUPT) -> Generator[None]:
         yield
     finally:
         for each, handler in before.items():
-            signal.signal(each, handler)
+            signal.signal(each, signal.SIG_DFL if handler is None else handler)  # None: not Python's own

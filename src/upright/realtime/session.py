@@ -51,6 +51,8 @@ class RunOrder:
         As `upright.laws.as_values` gives it.
     check : bool
         Whether a pulse is given first.
+    zero : bool
+        Whether the rig is awaited to rest and zeroed first, instead of going on from where it was zeroed before.
     rig_text : str
         Of the rig's file, for the log.
     references : tuple of (str, str)
@@ -67,6 +69,7 @@ class RunOrder:
     log: Path
     mode: Mode = Mode.HOST
     check: bool = True
+    zero: bool = True
     rig_text: str = ""
     references: tuple[tuple[str, str], ...] = ()
     fifo: bool = True
@@ -185,7 +188,7 @@ def carry_out(
     if order.accepted:
         hear(0.0, "accepted", f"The law's model is not trusted, and it runs all the same: {order.accepted}")
     try:
-        about = beside.prepare()
+        about = beside.prepare(zero=order.zero)
         end |= {"about": about, "held": beside.held}
         if order.check and not about.replayed:
             show(RunState(phase="testing: a small pulse"))

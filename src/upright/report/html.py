@@ -27,6 +27,7 @@ _MARKS = {
     "no": "no|not supported|refused|failed|outside|unseen|lost",
     "none": "not tested|not run|not asked|given|assumed|known|left out|nuisance|–",
 }
+_BREADTHS = (("narrow", 62), ("medium", 84), ("broad", 112))  # letters of 15 px in 550, 740 and 990 px
 SCALES = (1, 5, 20, 50, 100)
 """Half a scale of intervals in percent of the estimate."""
 
@@ -104,12 +105,12 @@ def mark(state: str) -> str:
 
 
 def breadth(table: Table) -> str:
-    """How wide a screen has to be for it to stand as a table: ``narrow``, ``medium`` or ``broad``."""
+    """How wide a screen it needs to stand as a table: ``narrow``, ``medium``, ``broad``; ``vast`` never does."""
     columns = zip(table.headings, *table.rows, strict=True)
     held = [max(max(map(len, cell.split() or [""])) for cell in c) if i not in table.numbers else max(map(len, c))
             for i, c in enumerate(columns)]  # fmt: skip
     letters = sum(h + 2 for h in held)
-    return "narrow" if letters <= 62 else "medium" if letters <= 84 else "broad"
+    return next((name for name, most in _BREADTHS if letters <= most), "vast")
 
 
 def sentences(text: str) -> list[str]:
@@ -119,7 +120,7 @@ def sentences(text: str) -> list[str]:
 
 def brief(chapter: Chapter) -> tuple[str, str, str, str]:
     """Headline, the rest of the verdict, what of its detail is shown at once, and what is folded."""
-    headline, *rest = sentences(chapter.verdict) or [""]
+    headline, *rest = sentences(chapter.verdict) or [chapter.title]
     words = len(f"{chapter.title} {chapter.question} {chapter.verdict} {chapter.first_line}".split())
     words += sum(len(f"{a.question} {a.state} {a.why}".split()) for a in chapter.assessments)
     shown: list[str] = []

@@ -13,7 +13,7 @@ from typing import Any
 
 from upright.basis import SIMULATED, Basis
 from upright.files import plain_values
-from upright.report.symbols import symbol
+from upright.report.symbols import slanted
 
 
 class Symbol(str):
@@ -31,7 +31,7 @@ class Symbol(str):
         from html import escape
 
         name, rest = self.divided()
-        return symbol(name) + escape(rest)
+        return slanted(name) + escape(rest)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,10 +141,13 @@ class Live:
     ----------
     markup : str
         The page.
+    short : bool
+        Whether half the height will do.
     """
 
     markup: str
     description: str
+    short: bool = False
 
 
 Block = str | Points | Facts | Code | Formula | Table | Picture | Live

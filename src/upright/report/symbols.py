@@ -55,6 +55,15 @@ def symbol(name: str) -> str:
     return f"<math><mrow>{identifier(name)}</mrow></math>"
 
 
+def slanted(name: str) -> str:
+    """HTML of a parameter's or signal's name, its stem slanted, its subscript upright; all of it is text."""
+    if not name.replace("_", "").isalnum():
+        return f"<span>{escape(name)}</span>"
+    stem, below, dot = parts(name)
+    below = f"<sub>{escape(below)}</sub>" if below else ""
+    return f"<i>{escape(stem)}{chr(0x307) if dot else ''}{below}</i>"
+
+
 def plain(name: str) -> str:
     """Symbol as text: ``theta_dot`` -> ``θ̇``, ``b_1c`` stays as the study file spells it."""
     stem, below, dot = parts(name)

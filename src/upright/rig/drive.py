@@ -35,7 +35,7 @@ def full_command(drive: Mapping[str, float]) -> float:
     """Command at which the force of a drive at rest meets its limit; infinite for a drive without one."""
     force, gain = drive.get("actuator.force_limit", math.inf), abs(drive[GAIN])
     left = gain - force * drive.get("actuator.droop", 0.0) if math.isfinite(force) else 0.0
-    return force / left if left > 0 else math.inf
+    return force / left + drive.get("actuator.dead_zone", 0.0) if left > 0 else math.inf
 
 
 def saturation(drive: Mapping[str, float]) -> float:

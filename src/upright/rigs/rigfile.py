@@ -166,7 +166,7 @@ class RigFile:
         before, section, after = text.partition("\n[counts]")
         rest = "".join(f"\n[{part}" for part in after.split("\n[")[1:])
         before = before if section else text + "\n"
-        return replace_file(self.path, "\n".join([before, "[counts]", *lines, ""]).encode() + rest.encode())
+        return replace_file(self.path, ("\n".join([before, "[counts]", *lines]) + f"\n{rest}".rstrip() + "\n").encode())
 
     def lean(self, unit: str, default: float) -> float:
         """How far the last coordinate may be from what is held [rad or m]."""

@@ -7,13 +7,16 @@ can be broken in all the ways that encoders break, so that whatever watches a ri
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.basis import SIMULATED
 from upright.control.trial import SUBSTEPS
+from upright.errors import BadInput, nearest
 from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.board import Board
@@ -172,7 +175,25 @@ class TwinPort:
 
 
 def _open(to: Connection) -> Board:
-    return Board(TwinPort(to.truth, to.zero if to.zero in to.model.plant.equilibria else ""))
+    return Board(TwinPort(_wired(to.truth, to.board), to.zero if to.zero in to.model.plant.equilibria else ""))
+
+
+def _wired(rig: Rig, board: Mapping[str, Any]) -> Rig:
+    """The rig with the faults of its wiring that [board] lists: by ``drive`` or coordinate, times what is right.
+
+    Raises
+    ------
+    BadInput
+        When one names nothing of the rig, or is no factor.
+    """
+    names = [c.name for c in rig.plant.coordinates]
+    for name, factor in board.items():
+        if name not in ("drive", *names):
+            raise BadInput(f"[board] of a twin has factors of drive, {', '.join(names)}; {nearest(name, names)}")
+        if isinstance(factor, bool) or not isinstance(factor, int | float) or not math.isfinite(factor):
+            raise BadInput(f"[board] {name} of a twin is a factor such as -1 or 0.5, got {factor!r}.")
+    shown = [s * float(board.get(n, 1.0)) for n, s in zip(names, rig.shown, strict=True)]
+    return replace(rig, gain=rig.gain * float(board.get("drive", 1.0)), scales=tuple(shown)) if board else rig
 
 
 DRIVER = Driver(name="twin", order=10, open=_open, performed=SIMULATED)

@@ -40,9 +40,11 @@ class RunRequest:
 
     `law` is a file, None for a signal that is put out blindly, `excite`; `reference` is a signal that the law follows.
     `from_rest` begins where the rig rests, however far that is from what is held, as a swing-up does.
-    `samples` are what is put out, sample by sample instead of in words; logs are called after the `stem`.
+    `samples` are what is put out, sample by sample instead of in words, or an `exploration` in its place, a rule that
+    rests on no model; logs are called after the `stem`.
     `bolted` is the inertia that a twin's hands add to its first body before it [kg or kg m^2].
     `accept` says why a law from a model that is not trusted runs on hardware all the same.
+    `settled` says that the rig hangs as it was zeroed and known, so that it is neither zeroed nor awaited again.
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
 
@@ -51,6 +53,7 @@ class RunRequest:
     excite: str = ""
     reference: str = ""
     samples: tuple[float, ...] = ()
+    exploration: Rule | None = None
     stem: str = "run"
     seconds: float = 30.0
     mode: str = "host"
@@ -60,10 +63,11 @@ class RunRequest:
     watch: bool = True
     from_rest: bool = False
     accept: str = ""
+    settled: bool = False
     own_process: bool = False
 
     def __post_init__(self) -> None:
-        if (self.law is None) == (not self.excite and not self.samples):
+        if (self.law is None) == (not self.excite and not self.samples and self.exploration is None):
             raise BadInput('A run needs either a law (--law design.json) or a signal (--excite "sine 0.5 2").')
         if not 0 < self.seconds <= 86_400:
             raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
@@ -245,6 +249,8 @@ def run_rig(
                 )
             unit = model.plant.coordinates[0].unit
             law = replace(law, references=np.array(signal(request.reference, unit, model.period, request.seconds)))
+    elif request.exploration is not None:
+        law = request.exploration
     else:
         samples = request.samples or signal(request.excite, model.unit, model.period, request.seconds)
         law = excitation_law(samples, len(model.per_unit), model.period)
@@ -255,6 +261,7 @@ def run_rig(
         make=partial(stage_of, request.rig, balance=balance, tilt=request.tilt, watch=request.watch,
                      from_rest=request.from_rest, bolted=request.bolted), law=as_values(law),
         seconds=request.seconds, log=path, mode=MODES[request.mode], check=request.check,
+        zero=not request.settled,
         rig_text=read_text(request.rig),
         references=references, accepted=request.accept.strip() if basis.level == NOT_TRUSTED else "",
     )  # fmt: skip

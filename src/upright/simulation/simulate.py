@@ -55,7 +55,8 @@ def simulate(
         ``"actuator.damping"`` [force per speed] while the command is not zero, ``"actuator.standby"`` whatever it is;
         ``"actuator.relaxation"`` [s], the time in which that braking builds up and fades;
         ``"actuator.fade"``, force lost per speed beyond ``"actuator.knee"`` in the force's own direction;
-        ``"actuator.droop"``, ``"actuator.force_limit"``, ``"actuator.damping_rise"``: see `upright.physics.actuator`.
+        ``"actuator.droop"``, ``"actuator.force_limit"``, ``"actuator.damping_rise"``, ``"actuator.dead_zone"``: see
+        `upright.physics.actuator`.
     x0 : array, shape (states,) or (lanes, states)
         Initial states: coordinate, its velocity, next coordinate, ...
     u : array, shape (T,) or (T, inputs), or None

@@ -74,13 +74,15 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     upright lab --rig furuta --nonideal
     upright lab --experiment 1b --experiment 2 -o out
     upright lab --rig RIG.toml
+    upright lab --rig RIG.toml --quick
     """,
 )
 @renamed(WORN)
 def lab(
     *, experiment: Sequence[str] | str | None = None, rig: str | None = None, seed: int = 0,
-    out: str | os.PathLike[str] | None = None, fresh: bool = False, workers: Workforce = 1, nonideal: bool = False,
-    accept: str | None = None, progress: Progress = silent, ask: Callable[[str], bool] | None = None,
+    out: str | os.PathLike[str] | None = None, fresh: bool = False, quick: bool = False, workers: Workforce = 1,
+    nonideal: bool = False, accept: str | None = None, progress: Progress = silent,
+    ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
 ) -> Answer[Laboratory]:  # fmt: skip
     """Run the paper's experiments, on simulated rigs or on hardware, and write one report.
@@ -102,6 +104,9 @@ def lab(
         Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
         Make again what the folder holds already.
+    quick : bool
+        Instead of experiments a minute at the rig of RIG.toml, without hands: how it is wired, dead zone, drive and
+        delay, a fit, gains, swing-up and catch.
     workers : int, str or executor
         Who runs experiments that need nothing of each other: processes of this machine, the address of a Dask
         scheduler, or an executor of `concurrent.futures`.
@@ -154,7 +159,7 @@ def lab(
     from upright.workers import Workers
 
     shared = Workers.of(workers)
-    requested = texts(experiment)
+    requested = _requested(texts(experiment), itself, quick=quick)
     beside = Path() if out is None else at
     live = (
         _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept or "")
@@ -191,6 +196,15 @@ def lab(
         interrupted=session.interrupted or pressed.times > 0, hints=tuple(hints),
     )  # fmt: skip
     return Answer(answer, page, [report] if pdf is None else [report, pdf])
+
+
+def _requested(experiments: Sequence[str], itself: bool, *, quick: bool) -> Sequence[str]:
+    """Experiments to make; `quick` is one by itself."""
+    if quick and experiments:
+        raise BadInput("--quick is a minute by itself; leave the experiments out, or --quick.")
+    if (quick or "quick" in experiments) and not itself:
+        raise BadInput("a minute at a rig needs the rig: upright lab --rig RIG.toml --quick.")
+    return ("quick",) if quick else experiments
 
 
 def _live(

@@ -83,7 +83,8 @@ def run(
     pdf : bool
         Write the page as PDF too.
     observe : callable, optional
-        Shown how it goes; answers with a sentence to end the run.
+        Shown how it goes; answers with a sentence to end the run. On hardware it has 2 s for that: who looks no more
+        cannot stop it either, and it ends.
     **on
         Of the run: reference, mode, accept; see `RunOptions`.
 

@@ -51,6 +51,10 @@ def test_a_number_that_only_scales_or_limits_brings_none(block, name):
     assert terms(block, {f"actuator.{name}": 0.3}) == set()
 
 
+def test_a_dead_zone_needs_no_course_through_the_sample(block):
+    assert terms(block, {"actuator.dead_zone": 0.3}) == {"dead"}
+
+
 def test_a_gain_that_falls_with_the_command_needs_no_course_through_the_sample(block):
     assert terms(block, {"actuator.droop": 0.3}) == {"droop"}
 

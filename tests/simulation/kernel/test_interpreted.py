@@ -19,7 +19,7 @@ LATE = {"actuator.limit": 2.0, "actuator.delay": 0.0037, "actuator.lag": 0.006, 
 DRIVE = {
     "actuator.start": 0.01, "actuator.end": 0.09, "actuator.damping": 0.5, "actuator.standby": 0.2,
     "actuator.fade": 0.4, "actuator.knee": 0.05, "actuator.relaxation": 0.01,
-    "actuator.droop": 0.4, "actuator.force_limit": 1.5, "actuator.damping_rise": 0.3,
+    "actuator.droop": 0.4, "actuator.dead_zone": 0.05, "actuator.force_limit": 1.5, "actuator.damping_rise": 0.3,
 }  # fmt: skip
 
 

@@ -85,16 +85,30 @@ class LiveStand(TestStand):
             rig=self.file.path, samples=tuple(samples), seconds=len(samples) * self.rig.period, tilt=lifted,
             bolted=bolted, check=False, watch=False, stem=stem,
         )  # fmt: skip
-        result = self._run(request, folder)
-        if result.end.stopped:
-            raise RigStopped(result.end.stopped)
-        return read(result.log_path)
+        return self._logged(request, folder)
+
+    def explore(self, rule: Rule, seconds: float, folder: Path, stem: str) -> Record:
+        """Log of a rule that finds out how the rig answers, from rest and with nothing compared with a model.
+
+        Raises
+        ------
+        RigStopped
+            When it did not run to its end.
+        KeyboardInterrupt
+            When somebody stopped it.
+        """
+        request = RunRequest(
+            rig=self.file.path, exploration=rule, seconds=seconds, check=False, watch=False, stem=stem
+        )  # fmt: skip
+        return self._logged(request, folder)
 
     def hold(
         self, law: Law | Rule, at: str, folder: Path, stem: str, seconds: float, *, start: Array | None = None,
-        reference: Array | None = None, pushes: Array | None = None,
+        reference: Array | None = None, pushes: Array | None = None, settled: bool = False,
     ) -> StandRun:  # fmt: skip
         """A run of a law, with the pulse before it; the filters run beside it where it is brought to what is held.
+
+        What is `settled` was zeroed and found to be wired well, and goes on from there without rest or pulse.
 
         What begins at rest elsewhere has no filters beside it, and may lean as it will; see `TestStand.hold`.
         """
@@ -106,7 +120,7 @@ class LiveStand(TestStand):
         request = RunRequest(
             rig=self.file.path, law=path, seconds=seconds + self.rig.period, stem=stem,
             tilt=0.0 if start is None else float(start[-2]), from_rest=from_rest,
-            accept=self.accept,
+            accept=self.accept, check=not settled, settled=settled,
         )  # fmt: skip
         result = self._run(request, folder)
         if result.log is None or len(result.log) < 3:
@@ -116,6 +130,12 @@ class LiveStand(TestStand):
             held, zero = (self.rig.plant.equilibrium(n) for n in (at, self.resting))
             origin = [held[n] - zero[n] for n in held]
         return run_of(result, at, origin)
+
+    def _logged(self, request: RunRequest, folder: Path) -> Record:
+        result = self._run(request, folder)
+        if result.end.stopped:
+            raise RigStopped(result.end.stopped)
+        return read(result.log_path)
 
     def _run(self, request: RunRequest, folder: Path) -> RigRun:
         with self.watching() as watch:

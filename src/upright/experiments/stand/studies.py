@@ -21,7 +21,7 @@ Tables = dict[str, dict[str, Any]]
 
 def write_study(
     stand: TestStand, path: Path, title: str, runs: Sequence[Mapping[str, Any]], *,
-    known: Sequence[Known] = (), drive: bool = True,
+    known: Sequence[Known] = (), drive: bool = True, actuator: Mapping[str, Any] | None = None,
 ) -> Path:  # fmt: skip
     """A study of logs of this rig.
 
@@ -33,6 +33,8 @@ def write_study(
         Numbers that an earlier experiment found, in the place of what the owner wrote.
     drive : bool
         Whether something drove; what stands between command and force is otherwise left as it is guessed.
+    actuator : mapping, optional
+        Entries of [actuator] that the owner's study leaves out.
     """
     tables_of_rig = _tables_of(stand, path.parent)
     units = {k.name: stand.rig.plant.quantity(k.name).unit for k in known}
@@ -50,7 +52,8 @@ def write_study(
         written,
     ]
     if drive:
-        tables += [table("[actuator]", digits=10, **_late(stand, tables_of_rig.get("actuator", {}))),
+        written_drive = {**(actuator or {}), **tables_of_rig.get("actuator", {})}
+        tables += [table("[actuator]", digits=10, **_late(stand, written_drive)),
                    table("[drive]", column=APPLIED, unit=stand.rig.unit)]  # fmt: skip
     for c, per in zip(stand.rig.plant.coordinates, stand.rig.per_unit, strict=True):
         counts = {"counts_per_rev": per * 2 * math.pi} if c.unit == "rad" else {"counts_per_m": per}

@@ -25,7 +25,7 @@ from upright.identification.search.starts import Sample, disagreement, regress, 
 from upright.identification.search.strategy import closed_form_starts, search
 from upright.physics.actuator import ACTUATOR
 
-OFFSET = "actuator.offset"
+DRIVE = ("actuator.offset", "actuator.dead_zone")
 TOGETHER = (("tilt_x", "tilt_y"),)
 """Numbers that are components of one thing."""
 FELT = 1e-3
@@ -159,6 +159,6 @@ def _left_out(rig: GreyBox) -> list[tuple[str, ...]]:
         return p is None or not (p.estimate or p.assumed or p.uncertainty or p.value != neutral(rig.plant, name))
 
     optional = [f.name for f in fields(rig.plant) if f.default == 0]  # gravity has another
-    names = [n for n in (*optional, *((OFFSET,) if rig.plant.inputs else ())) if idle(n)]
+    names = [n for n in (*optional, *(DRIVE if rig.plant.inputs else ())) if idle(n)]
     pairs = [pair for pair in TOGETHER if set(pair) <= set(names)]
     return [*pairs, *((n,) for n in names if not any(n in pair for pair in pairs))]

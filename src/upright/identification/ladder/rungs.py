@@ -16,6 +16,7 @@ from upright.identification.problem.unknowns import friction_names
 
 DRIVE = (
     ("offset of the drive", ("actuator.offset",)),
+    ("dead zone of the drive", ("actuator.dead_zone",)),
     ("lag of the drive", ("actuator.lag", "actuator.delay")),
     ("damping by the drive", ("actuator.slope", "actuator.damping", "actuator.standby", "actuator.relaxation")),
     ("damping that follows the command", ("actuator.damping_rise",)),

@@ -126,19 +126,19 @@ def _times(t: Array, rows: NDArray[np.int64]) -> dict[str, object]:
 
 def _panel(panel: TracePanel, rows: NDArray[np.int64]) -> dict[str, object]:
     measured = panel.measured
-    packed = {n: _packed((m if measured is None else measured - m)[rows]) for n, m in panel.models.items()}
+    models = {n: packed((m if measured is None else measured - m)[rows]) for n, m in panel.models.items()}
     return {
         "name": panel.name, "unit": panel.unit, "colour": panel.colour,
-        "measured": None if measured is None else _packed(measured[rows]),
+        "measured": None if measured is None else packed(measured[rows]),
         "models": [
-            {"name": n, "values": values, "band": _packed(panel.bands[n][rows]) if n in panel.bands else None}
-            for n, values in packed.items()
+            {"name": n, "values": values, "band": packed(panel.bands[n][rows]) if n in panel.bands else None}
+            for n, values in models.items()
         ],
-        "guess": None if panel.guess is None else _packed(panel.guess[rows]),
+        "guess": None if panel.guess is None else packed(panel.guess[rows]),
     }  # fmt: skip
 
 
-def _packed(values: Array) -> dict[str, object]:
+def packed(values: Array) -> dict[str, object]:
     """Values over their own range in 16 bits each; what is not finite is no value."""
     finite = np.isfinite(values)
     low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)

@@ -56,6 +56,8 @@ class Flavour:
         The drive brakes in proportion to its command.
     droop : bool
         The gain falls with the command.
+    dead : bool
+        Some of the command is lost to either side.
     loop : Structure or Written, optional
         What is compiled in of the `Law` or `Rule` that computes the input.
     record : bool
@@ -81,6 +83,7 @@ class Flavour:
     capped: bool = False
     rising: bool = False
     droop: bool = False
+    dead: bool = False
     loop: Structure | Written | None = None
     record: bool = True
     carried: bool = False
@@ -180,7 +183,8 @@ class Layout:
     @cached_property
     def settings(self) -> tuple[str, ...]:
         """Names of `rows` that stay as they are while a motion lasts: numbers of plant, drive and controller."""
-        drive = ("gain", "off", "lim", *["gd"] * self.flavour.droop, *["e", "ep", "th", "df"] * self.flavour.dynamic)
+        f = self.flavour
+        drive = ("gain", "off", "lim", *["gd"] * f.droop, *["dz"] * f.dead, *["e", "ep", "th", "df"] * f.dynamic)
         names = {f"{c}{j}" for c in drive for j in range(self.nu)} | {"di"} | set(self.constants)
         law = self.flavour.loop
         memory = {f"z{i}" for i in range(len(law.A))} if isinstance(law, Structure) else set[str]()
@@ -200,7 +204,9 @@ class Layout:
         names = [f"q{i}" for i in n] + [f"v{i}" for i in n] + [f"y{i}" for i in f.dahl] + [f"s{i}" for i in f.dry]
         names += [f"oq{i}" for i in n] + [f"ov{i}" for i in n] + [f"oy{i}" for i in f.dahl]
         names += [
-            f"{c}{j}" for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn", *["gd"] * f.droop) for j in nu
+            f"{c}{j}"
+            for c in ("ua", "um", "ub", "gain", "off", "lim", "ff", "cn", *["gd"] * f.droop, *["dz"] * f.dead)
+            for j in nu
         ]
         if f.dynamic:
             names += [f"{c}{j}" for c in ("co", "fo", "w", "e", "ep", "th", "df") for j in nu] + ["di"]
@@ -326,6 +332,7 @@ def choose(
         capped=capped,
         rising=on("actuator.damping_rise"),
         droop=on("actuator.droop"),
+        dead=on("actuator.dead_zone"),
         loop=None if loop is None else loop.compiled_in,
         record=record,
         strict=strict,

@@ -51,6 +51,11 @@ def start(w: Writer) -> None:
             w.add(f"{{{name}{j}}} = P[{first + k * p.nu + j}, _m]")
         if f.droop:
             w.add(f"{{gd{j}}} = P[{first + list(ACTUATOR).index('actuator.droop') * p.nu + j}, _m]")
+        if f.dead:
+            w.add(
+                f"{{dz{j}}} = P[{first + list(ACTUATOR).index('actuator.dead_zone') * p.nu + j}, _m]",
+                f"if not ({{dz{j}}} == {{dz{j}}}):", "    {q0} = nan",  # comparisons would let it pass unseen
+            )  # fmt: skip
         if f.dynamic:
             _actuator(w, j, first)
     law = first + len(ACTUATOR) * p.nu
@@ -132,9 +137,13 @@ def _clip(w: Writer, j: int, name: str) -> None:
 
 def _force_lines(w: Writer, j: int, name: str, command: str) -> list[str]:
     """Lines for the requested force of input `j` by a command."""
-    if not w.p.flavour.droop:
+    f = w.p.flavour
+    if not (f.droop or f.dead):
         return [f"{name} = {{gain{j}}} * ({command} + {{off{j}}})"]
-    return [f"_z = {command} + {{off{j}}}", f"{name} = {{gain{j}}} * _z / (1.0 + {{gd{j}}} * abs(_z))"]
+    lines = [f"_z = {command} + {{off{j}}}"]
+    if f.dead:
+        lines.append(f"_z = _z - {{dz{j}}} if _z > {{dz{j}}} else (_z + {{dz{j}}} if _z < 0.0 - {{dz{j}}} else 0.0)")
+    return [*lines, f"{name} = {{gain{j}}} * _z" + (f" / (1.0 + {{gd{j}}} * abs(_z))" if f.droop else "")]
 
 
 def _feed(w: Writer, back: tuple[tuple[str, str], ...]) -> None:

@@ -16,6 +16,8 @@ from upright.verbs.values import Start, read_pole_list, read_start
 
 if TYPE_CHECKING:
     from upright.control.score import Scores
+    from upright.identification.model.fit import RunScore
+    from upright.physics import Plant
     from upright.records import Array
     from upright.report.page import Chapter, Part
     from upright.rig import Rig
@@ -68,20 +70,64 @@ def played(
     return Played(scored, resting_on(chapter, known.basis, SIMULATED), files, text)
 
 
-class Played(Answer["Scores"]):
-    """What becomes of the rigs, and the page in which one of them moves; a notebook shows the page."""
+class Played(Answer["Scores | RunScore"]):
+    """What becomes of the rigs, or of a run, and the page in which it moves; a notebook shows the page."""
 
-    def __init__(self, scored: Scores, chapter: Chapter, files: Sequence[Path], page: str) -> None:
-        super().__init__(scored, chapter, files)
+    height = 1180
+
+    def __init__(self, value: Scores | RunScore, chapter: Chapter, files: Sequence[Path], page: str) -> None:
+        super().__init__(value, chapter, files)
         self.page = page
 
     def _repr_html_(self) -> str:
         from html import escape
 
-        return f'<iframe sandbox="allow-scripts" width="100%" height="1180" srcdoc="{escape(self.page)}"></iframe>'
+        frame = f'<iframe sandbox="allow-scripts" width="100%" height="{self.height}"'
+        return f'{frame} srcdoc="{escape(self.page)}"></iframe>'
 
 
-def live_part(name: str, draw: Callable[[], str]) -> tuple[Part, ...]:
+class PlayedRun(Played):
+    """A run and the page in which it is played."""
+
+    height = 760
+
+
+def played_run(
+    score: RunScore, plant: Plant, label: str, out: str | os.PathLike[str] | None = None
+) -> PlayedRun:  # fmt: skip
+    """A run, measured and simulated, in a page that plays it; written where `out` names a file ending in .html."""
+    from upright.files import replace_file
+    from upright.report.page import Chapter
+    from upright.report.symbols import percent
+
+    path = None if out is None else Path(out)
+    if path is not None and path.suffix != ".html":
+        raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
+    text = run_page(score, plant, label)
+    explained = ", ".join(f"{n} {percent(v)}" for n, v in score.fit_percent.items())
+    chapter = Chapter(
+        title=f"Run '{label}' in a page", verdict=f"Measured and simulated motion of '{label}': {explained}.",
+        numbers={"run": label, "fit_percent": dict(score.fit_percent)},
+    )  # fmt: skip
+    return PlayedRun(score, chapter, [] if path is None else [replace_file(path, text.encode())], text)
+
+
+def run_page(score: RunScore, plant: Plant, label: str) -> str:
+    """The page that plays a run, measured and simulated over each other."""
+    import numpy as np
+
+    from upright.live.motion import motion_page
+
+    order = np.argsort(score.t, kind="stable")  # of predictions restarted from time to time, some overlap
+    measured = {n: score.y[order, k] for k, n in enumerate(score.measured)}
+    simulated = {n: score.simulated[order, k] for k, n in enumerate(score.measured)}
+    ahead = "" if score.horizon is None else f"Predicted {score.horizon:g} s ahead, again and again. "
+    missing = [c.name for c in plant.coordinates if c.name not in measured]
+    still = f"Not measured, drawn at zero: {', '.join(missing)}." if missing else ""
+    return motion_page(plant, score.t[order], measured, simulated, name=label, remark=f"{ahead}{still}")
+
+
+def live_part(name: str, draw: Callable[[], str], title: str = "Push it", *, short: bool = False) -> tuple[Part, ...]:
     """The part of a report in which a rig moves; none where something is not known that it would take."""
     from upright.report.page import Live, Part
 
@@ -89,7 +135,7 @@ def live_part(name: str, draw: Callable[[], str]) -> tuple[Part, ...]:
         markup = draw()
     except UprightError:
         return ()
-    return (Part("Push it", (Live(markup=markup, description=f"The {name}, to be pushed"),), aside=True),)
+    return (Part(title, (Live(markup=markup, description=f"{title}: {name}", short=short),), aside=True),)
 
 
 def unplayable(rig: Rig) -> str | None:

@@ -8,24 +8,25 @@ from typing import Any, Unpack
 
 from upright.files import keeps_its_inputs
 from upright.verbs.command import command
-from upright.verbs.control.moving import Played, played
+from upright.verbs.control.moving import Played, played, played_run
 from upright.verbs.handover import rig_of
 from upright.verbs.options import TrialOptions
 
 
 @command(
     "Control",
-    metavars={"fit": "FIT", "poles": "LIST", "start": "LIST", "out": "PAGE"},
+    metavars={"fit": "FIT", "poles": "LIST", "start": "LIST", "log": "LOG", "out": "PAGE"},
     helps={"fit": "fit.json, its folder, or a study (TOML).", "out": "The page."},
     defaults={"out": "play.html"},
     more="""
     upright play out/fit.json -o play.html
     upright play out/fit.json --poles "-4.15+-1.63j, -16.9, -3.2" --limit "5 V"
+    upright play out/fit.json --log other_day.csv -o run.html
     """,
 )
 @keeps_its_inputs
 def play(
-    fit: Any, *, poles: str | Iterable[complex] | None = None, seed: int = 0,
+    fit: Any, *, poles: str | Iterable[complex] | None = None, seed: int = 0, log: Any = None,
     out: str | os.PathLike[str] | None = None, **on: Unpack[TrialOptions],
 ) -> Played:  # fmt: skip
     """Write a page with a live twin: push it, drag its poles, see which rigs of the fit are stabilised.
@@ -41,6 +42,8 @@ def play(
         Closed-loop poles to begin with [1/s]; proposed as by `design` when omitted.
     seed : int
         Of the rigs that are drawn.
+    log : path, Record or pandas.DataFrame, optional
+        A run of the rig: the page plays it, measured and as the fit predicts it, with a slider of time.
     out : path, optional
         Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
     **on
@@ -57,5 +60,12 @@ def play(
     BadInput
         When something of the rig is not known, or it cannot be drawn or compiled for a page.
     """
+    if log is not None:
+        from upright.verbs.handover import fitted_of
+        from upright.verbs.model.predict import predict
+
+        stored = fitted_of(fit, "play")
+        label, score = next(iter(predict(stored, log).value.items()))
+        return played_run(score, stored.rig().plant, label, out)
     known = rig_of(fit, "play", seed=seed, draws=on.get("draws", 200))
     return played(known, poles=poles, seed=seed, out=out, **on)

@@ -80,10 +80,15 @@ class FitAnswer(Answer["Fit"]):
         """What is known of numbers that rest on assumed ones, per these: ``fit.ratios["b_2/m_p"]``."""
         return {n: e for a in self.value.assumptions for n, e in a.ratios.items()}
 
-    def play(self, **options: Any) -> Played:
-        """The identified rig, moving in a page; options as for `up.play`."""
-        from upright.verbs.control.moving import played
+    def play(self, run: str = "", **options: Any) -> Played:
+        """The identified rig, moving in a page, options as for `up.play`; or one of the `runs`, measured and simulated.
 
+        A run's page has a slider of time; of `options` it takes ``out``.
+        """
+        from upright.verbs.control.moving import played, played_run
+
+        if run:
+            return played_run(_named(self.value.runs, run), self.plant, run, **options)
         return played(self.fitted.rig(seed=options.get("seed", 0), draws=options.get("draws", 200)), **options)
 
     @property
@@ -188,7 +193,7 @@ class FitAnswer(Answer["Fit"]):
             rig, parameters={n: replace(p, value=values[n], estimate=False) for n, p in rig.parameters.items()}
         )
         bands = self.value.bands if self.crossed is None else self.crossed.bands
-        return prediction(score(values, fixed, runs, bands=bands), rig.plant, bands)
+        return prediction(score(values, fixed, runs, bands=bands), self.plant, bands)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,7 +201,7 @@ class PredictedRuns:
     """Scores of runs that were predicted, by their labels."""
 
     runs: Mapping[str, RunScore]
-    plant: type[Plant]
+    plant: Plant
 
 
 class Prediction(Answer[PredictedRuns]):
@@ -206,14 +211,24 @@ class Prediction(Answer[PredictedRuns]):
         """Data against the prediction of the first run, or of the run called `name`."""
         from upright.report.fit.figures import fit_figure
 
-        runs = self.value.runs
-        label = name or next(iter(runs))
-        if label not in runs:
-            raise BadInput(f"no run is called '{label}'; {nearest(label, runs)}")
-        return fit_figure(runs[label], self.value.plant, title=label)
+        label = name or next(iter(self.value.runs))
+        return fit_figure(_named(self.value.runs, label), type(self.value.plant), title=label)
+
+    def play(self, run: str = "", *, out: str | Path | None = None) -> Played:
+        """The first run, or the one called `run`, measured and simulated in a page with a slider of time."""
+        from upright.verbs.control.moving import played_run
+
+        label = run or next(iter(self.value.runs))
+        return played_run(_named(self.value.runs, label), self.value.plant, label, out)
 
 
-def prediction(runs: Mapping[str, RunScore], plant: type[Plant], bands: Bands | None) -> Prediction:
+def _named(runs: Mapping[str, RunScore], label: str) -> RunScore:
+    if label not in runs:
+        raise BadInput(f"no run is called '{label}'; {nearest(label, runs)}")
+    return runs[label]
+
+
+def prediction(runs: Mapping[str, RunScore], plant: Plant, bands: Bands | None) -> Prediction:
     """Scores as an answer."""
     from upright.identification.inference.promise import promise
     from upright.report.fit.tables import score_table

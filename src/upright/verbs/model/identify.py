@@ -216,6 +216,8 @@ def identify(
     answer = FitAnswer(fit, page, written, requested, crossed)
     if folder is not None and (report or pdf):
         moves = live_part(requested.title or "rig", lambda: answer.play().page)
+        label = next((n for n, run in fit.runs.items() if run.role == "predict"), next(iter(fit.runs)))
+        moves += live_part(f"run '{label}'", lambda: answer.play(label).page, title="Watch it", short=True)
         written += write_page(replace(page, parts=(*page.parts, *moves)), folder / "report.html", pdf)
     return FitAnswer(fit, page, written, requested, crossed)
 

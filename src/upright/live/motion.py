@@ -1,0 +1,110 @@
+"""The page in which a run is played: measured and simulated rig over each other, at the time that a person chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from upright.errors import BadInput
+from upright.live.page import in_script, page_source, source_hash, still
+from upright.physics import Plant
+from upright.physics.outline import in_javascript
+from upright.records import Array
+from upright.report.html import rendered
+from upright.report.interactive.traces import packed
+from upright.report.symbols import plain
+
+RATE = 60.0
+"""Pictures a second at most: a screen shows no more."""
+MOST = 3600
+"""Pictures of a run at most, a minute of it; a longer run has fewer a second."""
+
+
+def motion_page(
+    plant: Plant,
+    t: Array,
+    measured: Mapping[str, Array],
+    simulated: Mapping[str, Array],
+    *,
+    name: str,
+    remark: str = "",
+) -> str:
+    """The page of a run.
+
+    Parameters
+    ----------
+    plant : Plant
+        Drawn to scale from its numbers.
+    t : array, shape (N,)
+        Times [s].
+    measured, simulated : mapping of str to array, shape (N,)
+        Motion by coordinate [rad or m]; what was simulated alone is drawn so, what neither has stands at zero.
+    name : str
+        Of the run.
+    remark : str
+        What else a reader must know.
+
+    Raises
+    ------
+    BadInput
+        When the plant does not say how it is drawn, or the motion is not finite.
+    """
+    from markupsafe import Markup
+
+    coordinates = list(plant.coordinates)
+    outline = in_javascript(partial(plant.outline, plant), len(coordinates))
+    if not outline:
+        raise BadInput(f"play needs a plant that says how it is drawn; give {type(plant).__name__} its outline(p, q).")
+    first, seconds = float(t[0]), float(t[-1] - t[0])
+    frames = int(min(MOST, max(2, seconds * RATE + 1)))
+    grid = first + np.linspace(0, seconds, frames)
+    columns: list[tuple[Array | None, Array]] = []
+    for c in coordinates:
+        if c.name not in simulated and c.name not in measured:
+            columns.append((None, np.zeros(frames)))
+            continue
+        shown = [np.interp(grid, t, of[c.name]) if c.name in of else None for of in (measured, simulated)]
+        columns.append((shown[0], shown[1] if shown[1] is not None else np.interp(grid, t, measured[c.name])))
+    if not all(np.isfinite(s).all() for _, s in columns):
+        raise BadInput(f"the simulated motion of {name} grows beyond all bounds, so it cannot be shown.")
+    data = {
+        "frames": frames, "step": seconds / (frames - 1), "start": first,
+        "coordinates": [
+            {"name": c.name, "unit": c.unit, "measured": None if m is None else packed(m), "simulated": packed(s)}
+            for c, (m, s) in zip(coordinates, columns, strict=True)
+        ],
+    }  # fmt: skip
+    style = page_source("play.css")
+    run = f"const RUN = {in_script(data)};\nconst OUTLINE = {outline};"
+    script = "\n".join([page_source("drawing.js"), run, page_source("motion.js")])
+    view, picture = still(plant, [float(s[0]) for _, s in columns])
+    return rendered(
+        "upright.live", "motion.html",
+        policy=f"default-src 'none'; script-src {source_hash(script)}; style-src {source_hash(style)}",
+        style=Markup(style), script=Markup(script), picture=Markup(picture), view=view, name=name, frames=frames,
+        strips=[_strip(c.name, c.unit, m, s) for c, (m, s) in zip(coordinates, columns, strict=True)],
+        drawn="Drawn to scale from the plant's numbers, rods as if uniform.", remark=remark,
+    )  # fmt: skip
+
+
+def _strip(name: str, unit: str, measured: Array | None, simulated: Array) -> dict[str, str]:
+    """Lines of one coordinate over time, in a box of 1000 by 100."""
+    base = simulated if measured is None else measured
+    low, high = float(base.min()), float(base.max())
+    room = 0.1 * (high - low) or 1e-3
+    low, high = low - room, high + room
+    scale, of = (180 / np.pi, "deg") if unit == "rad" else (100.0, "cm")
+    span = f"{scale * low:.3g} to {scale * high:.3g} {of}".replace("-", "\u2212")
+    lines = {
+        kind: "" if values is None else _points(np.clip(values, low, high), low, high)
+        for kind, values in (("measured", measured), ("simulated", simulated))
+    }
+    return {"symbol": plain(name), "range": f"[{span}]", "label": f"{plain(name)} over time, from {span}", **lines}
+
+
+def _points(values: Array, low: float, high: float) -> str:
+    rows = np.unique(np.linspace(0, values.size - 1, min(values.size, 1200)).astype(int))
+    x, y = 1000 * rows / (values.size - 1), 100 * (high - values[rows]) / (high - low)
+    return " ".join(f"{a:.5g},{b:.4g}" for a, b in zip(x, y, strict=True))
