@@ -47,7 +47,7 @@ def score_traces(
 
 def path_traces(fit: Fit) -> str:
     """How the cost and every parameter moved during the search, by accepted step."""
-    steps = np.arange(1.0, len(fit.path) + 1)
+    steps = np.arange(1, len(fit.path) + 1, dtype=np.float64)
     cost, relative = search_path(fit)
     panels = [
         TracePanel(name="mean squared residual", unit="", models={"cost": cost}, colour=0),
