@@ -5,7 +5,8 @@ is stirred by a tap; then something breaks. *Zero after* is the time from that u
 the converter at zero or the power stage off, to a tick; *arm* is how far the arm was from where it was held, at the
 farthest, until a second after that; *lean* how far the pendulum leaned when the output went to zero, after which it
 falls freely. Both are true motions, not what encoders show. Zero output does not brake: what turns fast when its limit
-is reached coasts on, so travel needs a limit on speed beside it.
+is reached coasts on, so travel needs a limit on speed beside it. Where the host's loop stops a rig whose drive and arm
+encoder it trusts, it brakes the arm first, 0.3 s at most, and that counts in *zero after*.
 
 Four rigs are broken, all with the supervisor of `upright run` beside them. The twin is the simulator with dry friction,
 delay and lag. The firmware is the program of a board with a pendulum inside (viscous friction, no delay or lag), once

@@ -143,6 +143,12 @@ A, B, *_ = rig.linear("inverted")
 model = up.StateSpace(A, B, states=["psi", "psi_dot", "theta", "theta_dot"], inputs=["v"])
 model.poles()
 
+# %% from_matlab
+from scipy.io import savemat  # stands for MATLAB's save
+
+savemat("model.mat", {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "Ts": 0.0})
+up.from_matlab("model.mat").poles()
+
 # %% place
 gains = up.place(rig.linear("inverted"), [-4 + 2j, -4 - 2j, -17, -3])
 gains

@@ -22,8 +22,8 @@ Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_con
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; every verb takes it
-Control     StateSpace, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design, export,
-            regulate, swing_up, track, play; Law, Rule
+Control     StateSpace, from_matlab, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design,
+            export, regulate, swing_up, track, play; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
 ==========  ==================================================================================================
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from upright.verbs.export import export
     from upright.verbs.firmware import firmware_build, firmware_flash, firmware_pins
     from upright.verbs.linear.feedback import dlqr, hold, lqr, margins, observer, place, prefilter
+    from upright.verbs.linear.matlab import from_matlab
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
     from upright.verbs.model.compare import compare
@@ -116,6 +117,7 @@ _HOMES = {
     "verbs.logs": ("log_convert", "log_recover", "log_replay", "log_show", "log_tail"),
     "systems": ("StateSpace",),
     "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "observer", "place", "prefilter"),
+    "verbs.linear.matlab": ("from_matlab",),
     "verbs.model.compare": ("compare",),
     "verbs.model.frequency": ("frequency",),
     "verbs.model.identify": ("identify",),
@@ -131,7 +133,7 @@ __all__ = [
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rig", "Rule",
     "StateSpace",
     "UprightError", "__version__", "chain", "chance", "compare", "design", "dlqr", "doctor", "export",
-    "firmware_build", "firmware_flash", "firmware_pins", "frequency", "hold",
+    "firmware_build", "firmware_flash", "firmware_pins", "frequency", "from_matlab", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
     "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "play", "predict", "prefilter", "quantity",
     "read", "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up",

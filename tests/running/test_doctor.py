@@ -78,6 +78,19 @@ def test_a_channel_that_is_dead_or_counts_backwards_is_told_by_its_name(tmp_path
     assert finding.observed.endswith("it counts the wrong way, swap its channels")
 
 
+def test_plugs_in_each_other_s_place_are_told_from_a_dead_encoder(tmp_path, wired):
+    def swapped(rig):
+        read = rig.port.read
+        rig.port.read = lambda: read()[::-1]
+
+    wired(swapped)
+    checkup = check_up(rig_file(tmp_path))
+    finding = found(checkup, "psi by hand")
+    assert (finding.good, finding.fix) == (False, "change the plugs of psi and theta over")
+    assert "theta moved: the encoders are in each other's place" in finding.observed
+    assert found(checkup, "the drive").good is None  # never switched on
+
+
 def test_a_hand_is_asked_in_the_coordinate_s_unit_and_may_refuse(tmp_path):
     asked = []
     checkup = check_up(rig_file(tmp_path, "linear"), hand=lambda text: bool(asked.append(text)), pulse=False)

@@ -336,6 +336,7 @@ def _conclude(
         unseen=unseen,
         warnings=(*warnings, *conventions),
         history=tuple(log.history),
+        path=tuple(log.path),
         interrupted=end.interrupted,
         not_evaluated=skipped,
         poles={} if identifiable.hidden else _poles(best),  # a pole may depend on what the data cannot see

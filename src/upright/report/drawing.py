@@ -148,7 +148,7 @@ def svg(drawing: Figure, name: str) -> str:
     text = re.sub(r"(url\(#|href=\"#)", rf"\1{name}-", text)
     text = re.sub(r'\s(xmlns|xmlns:xlink|version)="[^"]*"', "", text)
     text = re.sub(r"\n\s*", "\n", text)
-    text = re.sub(r'(?<= style=")[^"]*#[^"]*', _with_properties, text)
+    text = re.sub(r"(?<=: )#[0-9a-fA-F]{6}\b", _replaceable, text)
     opening = text[: text.index(">")]
     responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
@@ -156,17 +156,14 @@ def svg(drawing: Figure, name: str) -> str:
 
 
 def _short(path: re.Match[str]) -> str:
-    """A path in hundredths of a point, without the blanks that nobody needs."""
-    numbers = re.sub(r"(\.\d*?)0*(?=\D|$)", lambda m: m[1].rstrip("."), re.sub(r"(\.\d\d)\d+", r"\1", path[0]))
+    """A path in hundredths of a point, without the zeros and blanks that nobody needs."""
+    rounded = re.sub(r"(\.\d\d)\d+", r"\1", path[0])
+    numbers = re.sub(r"(\.\d*[1-9])0+(?!\d)|\.0+(?!\d)", r"\1", rounded)
     return re.sub(r"\s*([MLCQZz])\s*", r"\1", numbers)
 
 
-def _with_properties(style: re.Match[str]) -> str:
-    """A style whose colours a page may replace, in the dark; text is black where nothing is said."""
-    return re.sub(r"#[0-9a-fA-F]{6}\b", _replaceable, style[0])
-
-
 def _replaceable(colour: re.Match[str]) -> str:
+    """A colour of a style that a page may replace, in the dark."""
     name = _BY_HEX.get(colour[0].lower())
     return f"var(--mpl-{name}, {colour[0]})" if name else colour[0]
 

@@ -60,12 +60,13 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
             return {**vars(value), "tone": mark(value.state)}
         return None
 
-    content = {"version": __version__, **as_plain(page, instead)}
+    content: dict[str, Any] = {"version": __version__, **as_plain(page, instead)}
     if isinstance(page, Book):
         content["cover"] = as_plain(page.cover, instead)
         content["headline"] = page.headline
-        for chapter, plain in zip(page.chapters, content["chapters"], strict=True):
-            plain |= {"state": chapter.state, "tone": mark(chapter.state)}
+        plain: list[dict[str, Any]] = content["chapters"]
+        states = [{"state": c.state, "tone": mark(c.state)} for c in page.chapters]
+        content["chapters"] = [p | s for p, s in zip(plain, states, strict=True)]
     files["page.json"] = json.dumps(content, ensure_ascii=False).encode()
     files["main.typ"] = (Path(__file__).parent / "templates" / "report.typ").read_bytes()
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"

@@ -25,6 +25,8 @@ class Doubts:
 
     def __init__(self, model: Rig, at: str, name: str) -> None:
         self._name = name
+        self.body_trusted = False
+        """Whether what was found wrong leaves the driven body's encoder and the drive sound."""
         self._watch = Watch(model, at)
         self._drive, self._pendulum = StillDrive(model, at), StillPendulum(model, at)
 
@@ -39,6 +41,7 @@ class Doubts:
                     "too little, or something holds it fast. Check supply, cable and current limit."
                 )
             if still:
+                self.body_trusted = held is self._pendulum
                 moved = "its command must have moved it" if held is self._drive else "what carries it was accelerated"
                 return Fault.ENCODER, (
                     f"{held.name} shows not a single count although {moved}: its encoder is dead, or something holds "
@@ -46,7 +49,9 @@ class Doubts:
                 )
         if not self._watch.speaks()[0][0]:
             return None
-        return Fault.MODEL, f"{self._name} does not move as its model does; {self._named(self._watch.likely())}"
+        likely = self._watch.likely()
+        self.body_trusted = bool(likely) and all(s.name == self._pendulum.name for s in likely)
+        return Fault.MODEL, f"{self._name} does not move as its model does; {self._named(likely)}"
 
     @property
     def likeliest(self) -> str:

@@ -4,7 +4,8 @@ The order is fixed: open and read limits back, zero the encoders where it hangs,
 with the model's, the start window, a start without a jump; then, tick by tick, a look at the rig's own faults, at
 samples that do not go on, at the length of its tick, at travel, at how far it leans, at the command, and at whether
 command, driven body and pendulum agree (`control.watch`), which tells a wrong encoder or drive from a hand.
-Every way out goes through `LiveRig.estop` first.
+Every way out goes through `LiveRig.estop` before a word; where the host's loop stops it, and drive and body's encoder
+are sound, the body is braked before that, for at most `LONGEST`.
 
 This is supervision in software on a computer that may hang, not a rated safety function: a rig needs a stop in
 hardware.
@@ -13,12 +14,14 @@ hardware.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from upright.control.braking import LONGEST, SPAN, Braking
 from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
@@ -113,6 +116,8 @@ class Supervisor:
     _running: RunningLaw | None = field(init=False, default=None)
     _doubts: Doubts | None = field(init=False, default=None)
     _ticking: TickLength = field(init=False)
+    _braking: Braking | None = field(init=False, default=None)
+    _passed: deque[list[float]] = field(init=False)
     _last: Tick | None = field(init=False, default=None)
     _first: Tick | None = field(init=False, default=None)
     _command: float = field(init=False, default=0.0)
@@ -224,6 +229,10 @@ class Supervisor:
         self._in_window()
         self.rig.start(mode, self.law if mode == Mode.MCU and isinstance(self.law, Law) else None)
         self._running, self._mode = RunningLaw(self.law, self.about.period), mode
+        model = self.duty.model if mode == Mode.HOST and not self.about.replayed else None
+        falls = self.duty.at == "inverted" and len(self.target) == 2
+        self._braking = Braking(model, self.duty.at, self.held.command, falls=falls) if model else None
+        self._passed = deque(maxlen=1 + SPAN)
         self._last, self._first, self._command, self._stale = None, None, 0.0, 0
         self._ticking = TickLength()
         self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
@@ -297,7 +306,7 @@ class Supervisor:
                 drives = min(max(drives, -self.held.command), self.held.command)
                 away = [q - t for q, t in zip(readings, self.target, strict=True)]
                 if wrong := self._doubts.sees(readings, away, drives):
-                    self._give_up(*wrong)
+                    self._give_up(*wrong, body_trusted=self._doubts.body_trusted)
         self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
 
@@ -316,7 +325,7 @@ class Supervisor:
         self.event(self._time, "stop", "the run is over")
 
     def give_up(self, fault: Fault, why: str) -> None:
-        """Zero first, then the message.
+        """Zero first, or braked to rest and zero, then the message.
 
         Raises
         ------
@@ -351,6 +360,16 @@ class Supervisor:
         for name, q, most in zip(self.about.coordinates, readings, self.held.travel, strict=True):
             if abs(q) > most:
                 self._give_up(Fault.OVERTRAVEL, f"{name} is at {q:.4g}, beyond its travel of {most:.4g}.")
+        if self._braking is not None:
+            self._passed.append([q - target for q, target in zip(readings, self.target, strict=True)])
+            i, most = self._braking.which, self.held.travel[self._braking.which]
+            q, needed = (
+                readings[i],
+                self._braking.distance(math.copysign(1.0, readings[i]) * self._braking.momentum(self._passed)),
+            )
+            if abs(q) + needed > most:
+                self._give_up(Fault.OVERTRAVEL, f"{self.about.coordinates[i]} is at {q:.4g}, and needs {needed:.4g} to "
+                              f"stop within its travel of {most:.4g}.{self._likeliest}")  # fmt: skip
         if abs(readings[-1] - self.target[-1]) > self.duty.lean:
             self._give_up(
                 Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} left what is held by "
@@ -358,7 +377,26 @@ class Supervisor:
                 f"{self._likeliest}",
             )  # fmt: skip
 
-    def _give_up(self, fault: Fault, why: str) -> None:
+    def _brake(self, *, alone: bool) -> None:
+        """Bring the driven body to rest while the drive obeys; whatever goes wrong meanwhile ends it."""
+        braking, self._braking = self._braking, None
+        if braking is None or self._last is None:
+            return
+        first, last = braking.momentum(self._passed, alone=alone), self._last
+        with suppress(RigStopped):
+            for _ in range(round(LONGEST / self.about.period)):
+                momentum = braking.momentum(self._passed, alone=alone)
+                if not braking.goes_on(momentum, first):
+                    return
+                tick = self.rig.exchange(braking.command(momentum))
+                if tick.faults or tick.mode != Mode.HOST or tick.tick <= last.tick:
+                    return
+                last = tick
+                self._passed.append([q - target for q, target in zip(self.readings(tick), self.target, strict=True)])
+
+    def _give_up(self, fault: Fault, why: str, *, body_trusted: bool = False) -> None:
+        if body_trusted or not fault & (UNSEEING | Fault.GAINS | Fault.STOP):  # who stops it by hand means now
+            self._brake(alone=body_trusted)
         self.rig.estop()
         if self._running is not None and not fault & UNSEEING and self._still_driven():
             fault |= Fault.MODEL

@@ -99,6 +99,12 @@ def test_a_blind_direction_is_told_with_the_number_that_is_weighed_most_easily()
     )
 
 
+def test_a_number_that_is_felt_is_blind_only_beside_another_as_in_chaos() -> None:
+    (lost,) = seen("c b", [0.0, 1.0], effects=[3e9, 30.0]).sentences({})
+    assert lost.startswith("The data cannot see b beside c: the motion depends on that 1e+08 times as strongly")
+    assert "no measured output changes" not in lost
+
+
 @pytest.mark.parametrize(("second", "together"), [(0.91, True), (0.89, False), (1.0, True)])
 def test_numbers_scale_together_where_they_change_alike_to_a_tenth(second: float, together: bool) -> None:
     (said,) = seen("a b", [1.0, second]).sentences({})

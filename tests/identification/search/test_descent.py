@@ -192,3 +192,17 @@ def test_a_horizon_doubles_and_the_last_third_of_a_run_is_no_stage_of_its_own() 
         assert [float(name.split()[1]) > 7 for name in stages[:-1]] == [False] * (len(stages) - 1)
         assert stages[-1] == expected[-1]
         assert len(stages) == len(expected)
+
+
+def test_the_path_of_a_search_falls_from_step_to_step_and_ends_at_the_optimum() -> None:
+    """The mean square at the end is that of 2 mrad of noise in a signal of its own standard deviation."""
+    run = noisy(swing(), 2e-3, 5)
+    problem = formulate(rig(Pendulum, PENDULUM, {"J_p": 2.1e-3, "b_2": 1.8e-3}), [run])
+    log = SearchLog()
+    end = descend_progressively(problem, problem.start, log, horizon=math.inf)
+    costs = [cost for cost, _ in log.path]
+    assert len(costs) > 2
+    assert costs == sorted(costs, reverse=True)
+    assert log.path[-1][1] == problem.shared_at(end.x)
+    # of 1000 residuals the mean square scatters by 4.5 %
+    assert costs[-1] == pytest.approx((2e-3 / np.std(run.y)) ** 2, rel=0.2)

@@ -296,3 +296,18 @@ def test_where_the_data_say_nothing_every_bar_is_at_the_edge(changed):
     tiny = directions_figure(changed(names=("m_p", "J_p"), singular_values=np.array([1.0, 1e-20]),
                                      directions=np.eye(2))).axes[0]  # fmt: skip
     assert tiny.get_xlim()[0] == pytest.approx(1e-17)
+
+
+def test_the_path_of_a_search_is_drawn_relative_to_the_estimates(changed):
+    from upright.report.fit.figures import path_figure
+    from upright.report.fit.interactive import search_path
+
+    values = ({"J_p": 2.2e-3}, {"J_p": 1.1e-3, "J_d": 6.3e-3})
+    fit = changed(path=tuple(zip((4.0, 0.5), values, strict=True)))
+    cost, relative = search_path(fit)
+    assert cost.tolist() == [4.0, 0.5]
+    assert relative["J_p"] == pytest.approx([2.0, 1.0])
+    assert relative["J_d"] == pytest.approx([np.nan, 1.0], nan_ok=True)
+    above, below = path_figure(cost, relative).axes
+    assert above.lines[0].get_ydata().tolist() == [4.0, 0.5]
+    assert len(below.lines) == 6

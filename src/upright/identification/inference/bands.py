@@ -86,7 +86,7 @@ def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
         weight = float(track.ahead.weight[0])
         ahead = np.full(len(error[0]), track.run.horizons[0])
         return Sensitivity(error=error[0] / weight, slope=slope[0] / weight, age=ahead)
-    time = track.dt * np.arange(float(samples))
+    time: Array = track.dt * np.arange(samples, dtype=np.float64)
     if not track.windowed:
         return Sensitivity(error=error[:, 0], slope=slope[:, 0], age=time)
     ends = (np.moveaxis(a[1:], 1, 0).reshape(-1, *a.shape[2:]) for a in (error, slope))

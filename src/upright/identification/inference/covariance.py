@@ -233,7 +233,7 @@ def between_blocks(
         variances.append(spread * away * (student(len(parts) - 1) / student(freedom)) ** 2)
         steps = moved / np.sqrt(np.where(weight > 0, weight, np.inf))
         together += steps.T @ steps
-    return _along(together, np.mean(variances, axis=0) if variances else np.zeros(len(known)))
+    return _along(together, np.asarray(np.mean(variances or [np.zeros(len(known))], axis=0), dtype=np.float64))
 
 
 def _along(like: Array, variance: Array) -> Array:
@@ -284,6 +284,14 @@ class Identifiability:
             share = self.parts(d)
             names = [n for n, _ in share]
             if len(names) == 1:
+                felt, most = self.effects[self.names.index(names[0])], int(np.argmax(self.effects))
+                if felt > 1:  # doubled it would move the outputs by more than they vary: not seen beside another alone
+                    lines.append(
+                        f"The data cannot see {names[0]} beside {self.names[most]}: the motion depends on that "
+                        f"{self.effects[most] / felt:.0e} times as strongly, as where it is chaotic. Fit a shorter "
+                        "window, or one that is restarted (horizon)."
+                    )
+                    continue
                 lines.append(
                     f"The data cannot see {names[0]}: no measured output changes with it. "
                     "Give its value, or add a run in which it matters."

@@ -179,7 +179,7 @@ def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[f
     for sign, step in zip((-1.0, 1.0), steps, strict=True):
         most = 2.0 if u.log else 100 * max(abs(float(x[place])), u.scale)
 
-        def tell(cost: float, share: float = (sign + 1) / 2) -> None:
+        def tell(cost: float, _x: Array, share: float = (sign + 1) / 2) -> None:
             log.tell(f"interval of {u.name}", share, cost, problem)
 
         ends.append(_end(problem, x, place, model.cost, rise, sign * min(max(step, 1e-9 * u.scale), most), tell, log))
@@ -208,7 +208,7 @@ def _curvature(A: Array, place: int, best: Optimum) -> float:
 
 
 def _end(
-    problem: Problem, x: Array, place: int, best: float, rise: float, step: float, tell: Callable[[float], None],
+    problem: Problem, x: Array, place: int, best: float, rise: float, step: float, tell: Callable[[float, Array], None],
     log: SearchLog,
 ) -> float:  # fmt: skip
     """Coordinate at which the refitted cost has risen by `rise`, by secants of its square root, bracketed."""

@@ -214,7 +214,9 @@ class Fit:
     another, and the model is `trusted` when none of the first two is "no". `bands` is what it
     promises of predictions, None when it was interrupted; `not_evaluated` names all that it then does not say. It
     `failed` when the motion runs away at the numbers or just beside them: these are where the search stopped, and no
-    interval is known. `proposed` are numbers that the model leaves out and that would explain the runs far better.
+    interval is known.
+    `proposed` are numbers that the model leaves out and that would explain the runs far better. `path` are the mean
+    squared residual, relative to how the signals vary, and the shared numbers after each accepted step of the search.
     """
 
     model: GreyBox
@@ -236,6 +238,7 @@ class Fit:
     unseen: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     history: tuple[tuple[str, float, int], ...] = ()
+    path: tuple[tuple[float, Mapping[str, float]], ...] = ()
     interrupted: bool = False
     not_evaluated: tuple[str, ...] = ()
     assumptions: tuple[Assumption, ...] = ()

@@ -22,6 +22,10 @@ CREEP = 1e-3
 """A walk that gained less than this share in its last ten steps counts as settled when its evaluations run out."""
 
 
+LONGEST = 2000
+"""Accepted steps that are kept."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Descent:
     """Where a walk ended: coordinates, model there, whether it settled, whether it was interrupted."""
@@ -39,7 +43,8 @@ class SearchLog:
     `best` holds the problem last worked on and where in it the search stood, `lower` a problem, a lower cost of it met
     since and where, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the
     rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; evaluated only when a fit is
-    poor, since no search mends a reversed sign.
+    poor, since no search mends a reversed sign. `path` are the mean squared residual and the shared numbers after each
+    accepted step.
     """
 
     progress: Progress = silent
@@ -51,6 +56,13 @@ class SearchLog:
     unresolved: tuple[str, ...] = ()
     unreached: tuple[str, ...] = ()
     conventions: Callable[[], Sequence[str]] = tuple
+    path: list[tuple[float, dict[str, float]]] = field(default_factory=list[tuple[float, dict[str, float]]])
+
+    def step(self, stage: str, share: float, cost: float, problem: Problem, x: Array, horizon: float) -> None:
+        """Report progress, and keep where an accepted step of the descent led, at most `LONGEST` of them."""
+        self.tell(stage, share, cost, problem)
+        if len(self.path) < LONGEST:
+            self.path.append((cost / max(problem.count(horizon), 1), problem.shared_at(x)))
 
     def tell(self, stage: str, share: float, cost: float, problem: Problem) -> None:
         """Report progress, with the cost reached and the simulations made."""
@@ -76,7 +88,7 @@ def descend(
     tolerance: float = 1e-8,
     limit: int = 60,
     stride: float = 1.0,
-    report: Callable[[float], None] | None = None,
+    report: Callable[[float, Array], None] | None = None,
     here: Normal | None = None,
 ) -> Descent:
     """Minimize a sum of squares by Levenberg-Marquardt steps projected onto bounds.
@@ -130,7 +142,7 @@ def descend(
                 growth = 2.0
                 x, here = there, new
                 if report is not None:
-                    report(here.cost)
+                    report(here.cost, x)
                 if gained <= tolerance * here.cost and damping < 1:
                     converged = True
                     break
@@ -231,7 +243,7 @@ def descend_progressively(
         end = descend(
             lambda z, h=h: problem.normal(z, h), x, problem.lower, problem.upper,
             tolerance=tolerance if last else 1e-3, limit=60 if last else 25, here=here,
-            report=lambda cost, name=name, share=share: log.tell(name, share, cost, problem),
+            report=lambda cost, z, name=name, share=share, h=h: log.step(name, share, cost, problem, z, h),
         )  # fmt: skip
         x = end.x
         log.note(name, end.normal.cost, problem)

@@ -21,8 +21,9 @@ from upright.report.fit.figures import (
     directions_figure,
     fit_figure,
     interval_figure,
+    path_figure,
 )
-from upright.report.fit.interactive import score_traces
+from upright.report.fit.interactive import path_traces, score_traces, search_path
 from upright.report.fit.tables import (
     cross_table,
     finding,
@@ -359,7 +360,8 @@ def _strongest(fit: Fit) -> str:
 def _search(fit: Fit) -> list[Part]:
     """How the numbers were found."""
     how = f"{fit.method}; {fit.evaluations} evaluations in {fit.seconds:.3g} s; final cost {fit.cost:.6g}."
-    parts = [Part(title="How the numbers were found", key="how", content=(Points((how,)),), folded=True)]
+    content: tuple[Block, ...] = (Points((how,)), *_path_picture(fit))
+    parts = [Part(title="How the numbers were found", key="how", content=content, folded=True)]
     if fit.history:
         stages = tuple((stage, f"{cost:.6g}", str(evaluations)) for stage, cost, evaluations in fit.history)
         table = Table(
@@ -367,6 +369,22 @@ def _search(fit: Fit) -> list[Part]:
         )
         parts.append(Part(title="Stages of the search", key="stages", content=(table,), aside=True))
     return parts
+
+
+def _path_picture(fit: Fit) -> list[Picture]:
+    if len(fit.path) < 3:
+        return []
+    return [
+        Picture(
+            name="fit-search",
+            draw=lambda: path_figure(*search_path(fit)),
+            interactive=lambda: path_traces(fit),
+            caption="How the search went: the mean squared residual over the horizon of each stage (1 is how the "
+            "signals vary), and every parameter relative to its estimate, after each accepted step. The cost rises "
+            "where the horizon grows or another start is tried.",
+            description=f"{len(fit.path)} accepted steps; the mean squared residual ends at {fit.path[-1][0]:.3g}.",
+        )
+    ]
 
 
 FOLLOWED = 80.0

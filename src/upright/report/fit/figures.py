@@ -14,6 +14,7 @@ from upright.physics import Plant
 from upright.report.drawing import (
     BLACK,
     BLUE,
+    CYCLE,
     GREY,
     SKY,
     VERMILLION,
@@ -292,3 +293,20 @@ def _bars(ax: Axes, fit: Fit) -> None:
     ax.set_xlabel("singular value, largest = 1")
     ax.grid(visible=False, axis="y")
     ax.axvline(1e-6, color=BLACK, linewidth=0.7, linestyle=(0, (2, 2)))
+
+
+@styled
+def path_figure(cost: Array, relative: Mapping[str, Array]) -> Figure:
+    """How the cost and every parameter moved during the search, by accepted step."""
+    drawing = figure(4.2)
+    above, below = drawing.subplots(2, 1, sharex=True)
+    steps = np.arange(1, cost.size + 1)
+    above.semilogy(steps, cost, color=BLUE)
+    above.set_ylabel("mean squared\nresidual")
+    for (name, values), (colour, style) in zip(relative.items(), CYCLE * 5, strict=False):
+        below.plot(steps, values, color=colour, linestyle=style, label=name)
+    below.set_ylabel("relative to\nthe estimate")
+    below.set_ylim(0, 3)
+    below.set_xlabel("accepted step")
+    below.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawing

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
-from upright.identification import RunScore
+import numpy as np
+
+from upright.identification import Fit, RunScore
 from upright.physics import Plant
+from upright.report.drawing import Array
 from upright.report.interactive.traces import ROOM, TracePanel, traces
 from upright.report.symbols import plain
 
@@ -39,3 +43,23 @@ def score_traces(
         for k, signal in enumerate(first.measured)
     ]  # fmt: skip
     return traces(first.t, panels, name=name, restarts=None if first.ahead else first.horizon, room=room)
+
+
+def path_traces(fit: Fit) -> str:
+    """How the cost and every parameter moved during the search, by accepted step."""
+    steps = np.arange(1, len(fit.path) + 1, dtype=np.float64)
+    cost, relative = search_path(fit)
+    panels = [
+        TracePanel(name="mean squared residual", unit="", models={"cost": cost}, colour=0),
+        TracePanel(name="parameters relative to their estimates", unit="", models=relative, colour=1),
+    ]
+    return traces(
+        steps, panels, name="The search", axis="accepted step", unit="", logarithmic=("mean squared residual",)
+    )
+
+
+def search_path(fit: Fit) -> tuple[Array, dict[str, Array]]:
+    """Mean squared residual (steps,), and by symbol every parameter (steps,) relative to its estimate."""
+    cost = np.array([c for c, _ in fit.path])
+    last = {n: fit.estimates[n].value for n in fit.names if n in fit.estimates and fit.estimates[n].value}
+    return cost, {plain(n): np.array([values.get(n, math.nan) for _, values in fit.path]) / v for n, v in last.items()}

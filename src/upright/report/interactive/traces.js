@@ -105,7 +105,7 @@ const TRACES = [];
         width: this.box.clientWidth || 600, height: height + (last ? 44 : 8), padding: [6, 12, 0, 0], legend: { show: false },
         scales: { x: { time: false }, y: { distr: log ? 3 : 1, range: log ? undefined : (plot, low, high) => this.range(plot, low, high, follow, left) } },
         axes: [
-          { ...axis, size: last ? 24 : 8, ...(last ? { label: `${this.run.axis} [${this.run.unit}]`, labelSize: 20, labelGap: 0, gap: 2 } : { values: () => [] }) },
+          { ...axis, size: last ? 24 : 8, ...(last ? { label: this.run.unit ? `${this.run.axis} [${this.run.unit}]` : this.run.axis, labelSize: 20, labelGap: 0, gap: 2 } : { values: () => [] }) },
           { ...axis, size: LEFT, gap: 6, space: height > 100 ? 34 : 20, values: (_, splits) => splits.map((v) => (v === null ? "" : shown(v))) },
         ],
         series: [{}, ...lines.map((line) => ({

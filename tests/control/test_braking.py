@@ -1,0 +1,127 @@
+"""Does a stop end within the travel while the drive obeys, wherever the rig was and whatever it was drawn to be?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.hazards.sound import law_for
+from upright.control.braking import GRACE, SHARE
+from upright.errors import RigStopped
+from upright.experiments.nonideal import nonideal
+from upright.rig.makes import make_rig
+from upright.rigs import Board, Limits, TwinPort
+from upright.rigs.supervisor import Duty, Supervisor
+
+TRAVEL = {"furuta": 1.2, "linear": 0.15}
+COAST = 0.35  # s, in which a pendulum falls through the bottom
+
+
+def stopped(make, seed, during):
+    """How far the body truly was from zero, at the farthest, until it has coasted; what was said; its speed at zero."""
+    known, truth = make_rig(make), nonideal(make_rig(make, seed), seed)
+    limits = Limits(travel=(TRAVEL[make], math.inf), speed=(math.inf,) * 2, start=(math.inf,) * 2, command=known.limit)
+    port = TwinPort(truth)
+    rig = Board(port)
+    beside = Supervisor(rig, Duty(limits=limits, model=known, at="inverted", zero="hanging", lean=math.radians(25),
+                                  near=math.radians(15)))  # fmt: skip
+    beside.prepare()
+    port.hold("inverted", [0.0, 0.0, 0.03, 0.0])
+    beside.aim(law_for(known))
+    beside.start()
+    port.let_go()
+    tick, farthest = rig.exchange(0.0), 0.0
+    said = ""
+    for k in range(round(3.0 / known.period)):
+        during(k * known.period, port, beside)
+        try:
+            tick = rig.exchange(beside.step(tick))
+        except RigStopped as stop:
+            said = str(stop)
+            break
+        farthest = max(farthest, abs(port.x[0]))
+    assert said
+    speed = abs(float(port.x[1]))
+    for _ in range(round(COAST / known.period)):
+        rig.alone(known.period)
+        farthest = max(farthest, abs(port.x[0]))
+    assert rig.sample.applied == 0.0
+    return farthest, said, speed
+
+
+def blow(at, body, pendulum):
+    done = []
+
+    def during(t, port, beside):
+        if t >= at and not done:
+            done.append(t)
+            port.push([body, pendulum])
+
+    return during
+
+
+@pytest.mark.parametrize("make", ["furuta", "linear"])
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_a_body_that_is_struck_towards_its_end_stops_within_its_travel(make, seed):
+    rng = np.random.default_rng([seed, 5])
+    way = rng.choice([-1.0, 1.0])
+    hard = way * rng.uniform(1.5, 4.0)
+    strike = blow(rng.uniform(0.2, 0.5), 0.0, hard)
+    farthest, why, _ = stopped(make, seed, strike)
+    assert farthest <= TRAVEL[make], why
+
+
+@pytest.mark.parametrize("make", ["furuta", "linear"])
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_a_pendulum_shown_the_wrong_way_round_leaves_its_body_within_its_travel(make, seed):
+    def during(t, port, beside):
+        if t >= 0.3:
+            port.encoders.scaled(1, -1.0)
+
+    farthest, why, _ = stopped(make, seed, during)
+    assert farthest <= TRAVEL[make], why
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_a_brake_that_drives_the_body_on_is_let_go(seed):
+    """Its encoder turns round just before: what a brake may add is bounded by `GRACE` and the drive's delay."""
+    known = make_rig("furuta")
+    first = []
+
+    def during(t, port, beside):
+        if t >= 0.3 and not first:
+            port.push([0.0, 8.0])
+            port.encoders.scaled(0, -1.0)
+            first.append(t)
+
+    _, why, speed = stopped("furuta", seed, during)
+    strongest = SHARE * known.limit * known.linear("inverted").B[1, 0]
+    before = 15.0  # rad/s, what the law gave it until the pendulum had left by 25 degrees
+    assert speed < before + 1.3 * strongest * (GRACE + known.delay + known.lag + 6 * known.period), why
+
+
+def test_who_stops_it_by_hand_means_now():
+    known = make_rig("furuta")
+    limits = Limits(travel=(2.0, math.inf), speed=(math.inf,) * 2, start=(math.inf,) * 2, command=known.limit)
+    port = TwinPort(known)
+    rig, pressed = Board(port), []
+    beside = Supervisor(rig, Duty(limits=limits, model=known, at="inverted", zero="hanging", lean=1.0, near=0.3),
+                        stopped=lambda: "Stopped by hand." if pressed else "")  # fmt: skip
+    beside.prepare()
+    port.hold("inverted", [0.0, 0.0, 0.05, 0.0])
+    beside.aim(law_for(known))
+    beside.start()
+    port.let_go()
+    tick = rig.exchange(0.0)
+    for _ in range(100):
+        tick = rig.exchange(beside.step(tick))
+    assert abs(port.x[1]) > 0.1
+    pressed.append(True)
+    last, outputs = rig.sample.tick, []
+    rig.exchange, exchange = (lambda u: outputs.append(u) or exchange(u)), rig.exchange
+    with pytest.raises(RigStopped, match="by hand"):
+        beside.step(tick)
+    assert not any(outputs)
+    assert rig.sample.tick >= last
