@@ -93,7 +93,7 @@ class Sensor:
         values = _placed(readings, zero, factor, self.per_count)
         notes: tuple[str, ...] = ()
         if self.coordinate.unit == "rad" and np.abs(np.diff(values)).max(initial=0.0) > 1.5 * math.pi:
-            values = np.unwrap(values)
+            values = np.asarray(np.unwrap(values), dtype=np.float64)
             notes = (f"{self.column} jumps by a turn and was unwrapped",)
         return values, self.resolution or self.per_count, notes
 
