@@ -29,17 +29,17 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
     "workers", "long", "gpu", "crash", "safety", "dying", "false_stops", "minute", "images", "soak", "jitter", "gym",
-    "at_hand", "first", "kept", "strangers", "live", "peers", "mutants",
+    "at_hand", "quick_lab", "first", "kept", "strangers", "live", "peers", "mutants",
 )  # fmt: skip
 APART = ("peers", "mutants")
 """Those that run when they are named, and never among all: what is asked there is not how fast we are."""
 PUBLISHED = (
     "first", "kept", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers",
-    "crash", "safety", "dying", "false_stops", "soak", "jitter", "gym", "peers", "mutants",
+    "crash", "safety", "dying", "false_stops", "quick_lab", "soak", "jitter", "gym", "peers", "mutants",
 )  # fmt: skip
 SHARED = (
     "first", "kept", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts",
-    "soak", "at_hand",
+    "soak", "at_hand", "quick_lab",
 )  # fmt: skip
 """Those whose table is a page, and those whose work processes may share."""
 

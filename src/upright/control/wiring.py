@@ -132,7 +132,7 @@ class WiringCheck:
         out: list[tuple[str, str]] = []
         rows = zip(self.names, self.described, self.turns, self.scale, self.error, strict=True)
         for name, described, turns, scale, error in rows if self.moves and self.swings else ():
-            if abs(scale - 1.0) <= max(TOLERATED, SURE * error):
+            if abs(math.log(scale)) <= max(TOLERATED, SURE * error / scale):
                 continue
             counts = abs(described) * scale
             usual = {round(abs(described) * edges) for edges in (0.25, 0.5, 2.0, 4.0)} | (
