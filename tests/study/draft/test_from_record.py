@@ -7,6 +7,7 @@ import pytest
 
 from tests.identification.twins import PENDULUM, swing
 from upright.errors import BadInput
+from upright.identification import identify
 from upright.physics import Furuta, Pendulum
 from upright.records import Provenance, Record
 from upright.study.draft.from_record import study_of_record
@@ -35,6 +36,17 @@ def test_numbers_may_wear_their_unit_and_their_uncertainty() -> None:
     # what was neither known nor asked does nothing
     assert study.model.estimated == ("J_p",)
     assert study.model.parameters["b_2"].value == 0.0
+
+
+def test_a_known_centre_of_gravity_leaves_the_inertia_to_be_estimated() -> None:
+    """Unless somebody says what to ask, or knows it: without a length a draft takes a simple pendulum."""
+    study = study_of_record(swung(), Pendulum, known={"m_p": PENDULUM["m_p"], "l_cg": PENDULUM["l_cg"]})
+    assert study.model.parameters["J_p"].estimate
+    fit = identify(study.model, study.runs)
+    assert fit.estimates["J_p"].value == pytest.approx(PENDULUM["J_p"], rel=1e-4)  # a swing without noise
+    assert study_of_record(swung(), Pendulum, known={"m_p": 0.2}).model.parameters["J_p"].assumed
+    known = {"m_p": 0.2, "l_cg": 0.3, "J_p": 1e-3}
+    assert not study_of_record(swung(), Pendulum, known=known).model.parameters["J_p"].estimate
 
 
 def test_what_is_asked_and_known_at_once_is_a_sentence() -> None:

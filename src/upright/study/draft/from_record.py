@@ -148,6 +148,9 @@ def _answer(
     """Replace guesses of a draft by what is known and estimated; what is not estimated then is as a rig has it."""
     names = (*plant.names(), *ACTUATOR)
     estimated = [] if ask is None else list(ask)
+    inertia = values.get("J_p")
+    if ask is None and "l_cg" in known and isinstance(inertia, dict) and inertia.get("assumed"):
+        estimated += {"J_p"} - {*known, *given}  # a draft without a length takes the pendulum for a simple one
     for name in (*known, *estimated):
         if name not in names:
             raise BadInput(f"{plant.__name__} has no number '{name}'; {nearest(name, names)}")

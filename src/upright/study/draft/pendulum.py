@@ -56,7 +56,7 @@ MASS = 0.1
 """Of a pendulum that nobody weighed [kg]."""
 
 SCALE = "MEASURE: sets the scale of all forces"
-SIMPLE = "MEASURE it or l_cg: with 0, l_cg is the length of the simple pendulum of equal period"
+SIMPLE = "with 0, l_cg is the length of the simple pendulum of equal period; MEASURE l_cg and give this a guess"
 
 
 @dataclass(frozen=True, kw_only=True)
