@@ -6,7 +6,7 @@ None is better than its reasons. What was not tested is reported as not tested.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from upright.basis import NOT_SUPPORTED, in_percent
@@ -196,8 +196,8 @@ def _predicts(evidence: Evidence) -> Judgement:
     part = "in part" if blank or narrow or vague or still or evidence.missing else "yes"
     far = f" Outside what the fit has seen: {', '.join(outside)}." if outside else ""
     headline = (
-        f"{explains}It predicts {_ranges(evidence.runs, 'predict')} of runs it has not seen{_beside(evidence.runs)}."
-        f"{far}"
+        f"{explains}It predicts {_ranges(evidence.runs, 'predict', still)} of runs it has not seen"
+        f"{_beside(evidence.runs)}.{far}"
     )
     beaten = _beaten(evidence.runs)
     if beaten:
@@ -504,12 +504,16 @@ def _range(percents: Mapping[str, float]) -> str:
     return f"{low} %" if low == high else f"{low} to {high} %"
 
 
-def _ranges(runs: Mapping[str, RunScore], role: str) -> str:
-    """Ranges of the fit percents of runs with a role, those of free runs and of every horizon by themselves."""
+def _ranges(runs: Mapping[str, RunScore], role: str, without: Collection[str] = ()) -> str:
+    """Ranges of the fit percents of runs with a role, those of free runs and of every horizon by themselves.
+
+    `without` some signals, unless these are all.
+    """
     kinds: dict[float, dict[str, float]] = {}
     for label, s in runs.items():
         if s.role == role:
-            percents = {f"{label} {signal}": p for signal, p in s.fit_percent.items()}
+            every = {f"{label} {signal}": p for signal, p in s.fit_percent.items()}
+            percents = {what: p for what, p in every.items() if what not in without} or every
             kinds.setdefault(s.horizon or 0.0, {}).update(percents)
     free = "" if len(kinds) == 1 else " in free runs"
     return " and ".join(

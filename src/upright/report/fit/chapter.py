@@ -406,7 +406,7 @@ def fit_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", cross
     loop = fit.answers[-1] if fit.answers else None
     if loop and fit.trusted and loop.answer == "not tested" and loop.advice:
         yield Step(loop.advice)
-    yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder))
+    yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder), *_stopped(fit))
     untested = "Every run was fitted, so nothing tests the model yet; "
     if not (crossed or fit.interrupted) and all(s.role == "fit" for s in fit.runs.values()):
         if len(fit.runs) > 1:
@@ -440,13 +440,6 @@ def _broken(fit: Fit) -> Iterator[Step]:
             "followed at first, end the window there, or restart it from measured states.",
             '[[runs]]\nhorizon = "0.5 s"',
         )
-    stopped = [n for n, e in fit.estimates.items() if e.status == "at bound"]
-    none = [n for n in stopped if fit.estimates[n].value == 0]
-    if none:
-        yield Step(f"These runs need no {', '.join(none)}: the estimate ended at zero; leave it out.")
-    for name in stopped:
-        if name not in none:
-            yield Step(f"{name} stopped at its bound; widen the bound or give its value as known.")
 
 
 REVERSED = (-160.0, -40.0)
@@ -458,6 +451,16 @@ def _so_far_off(missed: Collection[float]) -> str:
     if all(REVERSED[0] < value < REVERSED[1] for value in missed):
         return ", as by a reversed sign. Where the study says sign = -1 already, take that out."
     return ": look at the plant and at the units of its columns first, then at the sign."
+
+
+def _stopped(fit: Fit) -> Iterator[Step]:
+    stopped = [n for n, e in fit.estimates.items() if e.status == "at bound"]
+    none = [n for n in stopped if fit.estimates[n].value == 0]
+    if none:
+        yield Step(f"These runs need no {', '.join(none)}: the estimate ended at zero; leave it out.")
+    for name in stopped:
+        if name not in none:
+            yield Step(f"{name} stopped at its bound; widen the bound or give its value as known.")
 
 
 def _blind(fit: Fit) -> Iterator[Step]:
