@@ -80,7 +80,7 @@ def test_whatever_is_asked_comes_after_what_it_stands_on():
                 order = [x.key for x in laboratory.chosen_experiments([name], make)]
                 assert e.key in order
                 there = {x.key: x for x in EXPERIMENTS}
-                on = make or e.makes[0]
+                on = make or next(iter(e.makes), "")
                 for need in e.needs:
                     if on in there[need].makes and on == (make or there[need].makes[0]):
                         assert order.index(need) < order.index(e.key)

@@ -42,7 +42,7 @@ def test_a_run_that_stops_says_why_and_ends_with_3(bench):
     assert done.exit_code == 3
     told = json.loads(done.stdout)
     assert told["faults"] & Fault.OVERTRAVEL
-    assert "left its travel" in told["stopped"]
+    assert "within its travel" in told["stopped"]
 
 
 def test_a_rig_that_is_wired_as_described_passes_and_the_machine_is_measured(bench):
@@ -55,7 +55,7 @@ def test_a_rig_that_is_wired_as_described_passes_and_the_machine_is_measured(ben
 
 def test_mistakes_are_answered_in_a_sentence(bench):
     for words, said in (
-        (["run", "--rig", "RIG.toml"], "needs a law"),
+        (["run", "--rig", "RIG.toml"], "needs either a law"),
         (["run", "--rig", "NO.toml", "--law", "design.json"], "was not found"),
         (["run", "--rig", "RIG.toml", "--law", "RIG.toml"], "no JSON"),
         (["run", "--rig", "RIG.toml", "--law", "design.json", "--reference", "step 0.1"], "follows no reference"),

@@ -20,6 +20,8 @@ SHARE = 0.5
 SWAY = 1.5
 """Times as far as by the model may a pendulum's fall sway its body: masses and lengths are off, and it is not at rest.
 """
+RESERVED = 0.5
+"""Share of the travel that is kept for that sway at most: a loop needs room to run."""
 SLOWING = 0.03
 """Time constant by which the body is slowed once the command is no longer at its limit [s]."""
 LONGEST = 0.3
@@ -63,10 +65,11 @@ class Braking:
         speed, other = ((away[-1][i] - away[0][i]) / for_ for i in (self.which, self._other))
         return speed if alone else speed + self._carried * math.cos(away[-1][self._other]) * other
 
-    def distance(self, momentum: float) -> float:
-        """From where braking begins to the farthest [rad or m], for a momentum outwards."""
+    def distance(self, momentum: float, travel: float) -> float:
+        """From where braking begins to the farthest [rad or m], for a momentum outwards, within a travel."""
         v = max(0.0, momentum)
-        return v * self._late + v**2 / (2 * abs(self._per_command) * self._most) + SWAY * abs(self._carried)
+        sway = min(SWAY * abs(self._carried), RESERVED * travel)
+        return v * self._late + v**2 / (2 * abs(self._per_command) * self._most) + sway
 
     def goes_on(self, momentum: float, first: float) -> bool:
         """Whether to brake on at a momentum, when it was another at first."""

@@ -363,10 +363,9 @@ class Supervisor:
         if self._braking is not None:
             self._passed.append([q - target for q, target in zip(readings, self.target, strict=True)])
             i, most = self._braking.which, self.held.travel[self._braking.which]
-            q, needed = (
-                readings[i],
-                self._braking.distance(math.copysign(1.0, readings[i]) * self._braking.momentum(self._passed)),
-            )
+            q = readings[i]
+            outwards = math.copysign(1.0, q) * self._braking.momentum(self._passed)
+            needed = self._braking.distance(outwards, most)
             if abs(q) + needed > most:
                 self._give_up(Fault.OVERTRAVEL, f"{self.about.coordinates[i]} is at {q:.4g}, and needs {needed:.4g} to "
                               f"stop within its travel of {most:.4g}.{self._likeliest}")  # fmt: skip

@@ -166,7 +166,7 @@ def test_a_port_alone_is_not_driven_but_given_a_file_to_fill_in(tmp_path):
 
 def fill_in(path):
     """Every question answered as its example does."""
-    path.write_text(re.sub(r"(?m)^# (?=[\[\w]+ ?[=.])", "", path.read_text("utf-8")), encoding="utf-8")
+    path.write_text(re.sub(r"(?m)^# (?=\[\w+\]|[\[\w]+ ?[=.])", "", path.read_text("utf-8")), encoding="utf-8")
 
 
 UNTRUSTED = Basis(level=NOT_TRUSTED, sentence="The runs are explained to 41 %.")

@@ -170,9 +170,16 @@ def pushed(law: Law | Rule, reference: Array | None, pushes: Array | None) -> La
 def run_of(result: RigRun, at: str, origin: Sequence[float] | None = None) -> StandRun:
     """A logged run about an equilibrium, its time from where the loop began: states are the readings and their
     differences, counted from what was held, or from the readings of an origin.
+
+    Raises
+    ------
+    BadInput
+        When it was stopped before there is any difference.
     """
     assert result.log is not None
     t, away = result.t, result.away
+    if t.size < 2:
+        raise BadInput(f"The run ended before its second sample. {result.end.stopped}")
     if origin is not None:
         away = away + np.subtract(result.end.target, origin)
     x = np.empty((t.size, 2 * away.shape[1]))

@@ -17,7 +17,7 @@ from upright.systems import StateSpace
 _HOW = "[A, B, C, D, Ts] = ssdata(sys); save('model.mat', 'A', 'B', 'C', 'D', 'Ts', '-v7')"
 
 
-def from_matlab(file: str | os.PathLike[str], name: str = "") -> StateSpace:
+def from_matlab(file: str | os.PathLike[str], name: str | None = None) -> StateSpace:
     """Linear model of a MAT file: variables or a structure with the fields A, B, C, D and Ts, as `ssdata` gives them.
 
     MATLAB stores `ss`, `idss` and `idgrey` objects in a form that only MATLAB reads. Save their matrices::
@@ -60,7 +60,7 @@ def from_matlab(file: str | os.PathLike[str], name: str = "") -> StateSpace:
     )  # fmt: skip
 
 
-def _fields(content: Variables, name: str, file: str) -> Variables:
+def _fields(content: Variables, name: str | None, file: str) -> Variables:
     """Variables of a file, or fields of its one structure with an A, or of the one named."""
     models = {key: value for key, value in content.items() if isinstance(value, dict) and "A" in value}
     if name:
