@@ -121,6 +121,7 @@ def test_a_trusted_fit_has_no_such_line_and_a_simulation_says_that_it_is_one(ver
         assert ("SIMULATED" in text) == simulated
 
 
+@pytest.mark.slow
 def test_what_is_made_from_a_design_begins_with_the_verdict_of_its_fit(tmp_path):
     """Fit, design, program and run: the sentence goes all the way."""
     fit = fit_of("furuta", tmp_path, UNTRUSTED)
@@ -163,6 +164,7 @@ def test_an_exported_rig_says_first_that_its_fit_is_not_trusted(form, tmp_path):
     assert SAID in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("said", [{}, {"verdict": "All is well."}, {"trusted": True}])
 def test_an_old_fit_without_a_verdict_counts_as_not_trusted(said, tmp_path):
     done = upright("design", fit_of("furuta", tmp_path, said), *CLOSED, "-o", tmp_path)

@@ -64,6 +64,7 @@ def test_a_chain_of_too_many_bodies_is_not_derived(here, bodies):
     assert f"a chain has 1 to 9 bodies, got {bodies}" in sentence("init", "swing.csv", "--plant", f"torsional-{bodies}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", ["swing.csv", "nine.csv"])
 def test_nine_disks_are_drafted_where_nine_columns_turn(here, log):
     done = run("init", log, "--plant", "torsional-9", "-o", "nine.toml")

@@ -115,6 +115,7 @@ def test_a_terminal_that_goes_away_leaves_no_traceback(folder, tmp_path, shell, 
     assert b"Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_warnings_of_libraries_stay_off_the_terminal(folder, tmp_path):
     """NumPy says of 0/0 what a sentence should; with UPRIGHT_DEBUG it may speak."""
     script = (

@@ -21,6 +21,7 @@ def test_plain_paths_wear_no_quotes():
     assert typed("../logs/run-01_a.csv") == "../logs/run-01_a.csv"
 
 
+@pytest.mark.slow
 def test_the_command_that_init_proposes_is_found_by_a_shell(tmp_path):
     folder = tmp_path / "two words"
     folder.mkdir()

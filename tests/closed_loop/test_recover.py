@@ -55,6 +55,7 @@ def test_every_structure_is_found_exactly(structure: str, program: dict) -> None
         assert found.gains["second tap"].value == pytest.approx(program["second"], rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("structure", "program"), STRUCTURES.items(), ids=STRUCTURES)
 def test_rounded_commands_bound_the_gains_on_both_sides(structure: str, program: dict) -> None:
     found = found_in(closed_loop(Pid(**program), count=1e-3, step=0.01))

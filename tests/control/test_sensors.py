@@ -41,6 +41,7 @@ def checked(rig, make):
     return scales(make_rig(make), shown_by_encoders(rig, command(make)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", MAKES)
 @pytest.mark.parametrize("shown", [(1.0, -1.0), (-1.0, 1.0), (1.0, 0.5), (4.0, 1.0), (1.1, 0.9)])
 def test_what_an_encoder_shows_over_what_is_true_is_found_hanging(make, shown):

@@ -169,6 +169,7 @@ def test_a_rig_that_nobody_identified_is_led_to_a_fit_and_one_with_a_fit_is_not(
     assert not any("upright identify STUDY.toml" in s.command for s in chapter(drawn).steps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weights", [(), (1.0, 0.0, 30.0, 0.1)])
 def test_the_way_of_the_poles_of_least_cost_passes_through_those_chosen(weights):
     """Its middle, the 150th of 300 weights a hundredfold either way, is the effort weight that was chosen."""

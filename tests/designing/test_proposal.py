@@ -32,6 +32,7 @@ def test_a_design_without_poles_holds_the_rig(name, at):
     assert "No poles were requested" in str(design)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RIGS)
 def test_no_other_pace_is_quieter_with_as_much_margin(name):
     design = up.design(RIGS[name])
@@ -45,6 +46,7 @@ def test_no_other_pace_is_quieter_with_as_much_margin(name):
     assert pace == pytest.approx(fall)
 
 
+@pytest.mark.slow
 def test_a_start_that_the_drive_cannot_take_asks_for_slower_poles():
     """Twice the tilt needs twice the command, at any pace; the pace that takes least is then the one."""
     mild, hard = (up.design(RIGS["furuta"], start={"theta": tilt}) for tilt in ("2 deg", "60 deg"))
@@ -71,6 +73,7 @@ def test_what_has_no_pace_of_its_own_is_asked_for_poles():
         up.design(([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]]), period="10 ms")
 
 
+@pytest.mark.slow
 def test_no_pace_that_a_loop_can_hold_is_said():
     """A delay of half a second outlasts a fall by e every 0.13 s many times."""
     with pytest.raises(BadInput, match=r"no poles from 0\.7 to 2 times"):

@@ -67,6 +67,7 @@ def run(source, tmp_path, **options):
     return regulate(source, poles=POLES, seconds=1.0, draws=4, out=tmp_path / "out", **options)
 
 
+@pytest.mark.slow
 def test_the_loop_that_is_told_is_that_of_the_study_s_rig(study, tmp_path):
     """The run told beforehand against one put together by hand of the study's numbers: the command meets 10 V."""
     told = run(study(), tmp_path, start="19 deg").value
@@ -81,6 +82,7 @@ def test_the_loop_that_is_told_is_that_of_the_study_s_rig(study, tmp_path):
     np.testing.assert_array_equal(attempt.before.run.x, direct.x)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [1.0, 10.0])
 def test_the_limit_of_the_study_decides_what_holds(study, tmp_path, limit):
     """To turn back from a tilt at rest the cart needs g tan(tilt): 1.76 N at 10 degrees, where 1 V gives 1.5 N."""
@@ -222,6 +224,7 @@ def fit_of(seed: int, folder: Path) -> Path:
     return folder / "fit.json"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ran", "another"), [(3, False), (4, True)])
 def test_a_fit_that_meets_another_seed_says_so(tmp_path, ran, another):
     done = run(fit_of(3, tmp_path), tmp_path, seed=ran)

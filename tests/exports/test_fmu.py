@@ -106,6 +106,7 @@ def test_every_plant_moves_as_here(name, tmp_path):
     assert np.abs(ours - walked(tmp_path / "rig.fmu", plant, x0, commands, 0.02)).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.03, 0.0])
 def test_elementary_functions_and_kinks_are_those_of_the_kernel(gap, tmp_path):
     """With the bumpers where the cart rests it has no linear model, and steps as the stiffer side asks."""

@@ -86,6 +86,7 @@ def no_computer_s_word_for_nothing(text: str) -> None:
     assert found == []
 
 
+@pytest.mark.slow
 def test_a_page_can_be_parsed_heard_and_told_apart(chapter):
     text = html_page(chapter)
     page = Page(text)
@@ -201,6 +202,7 @@ def test_what_a_person_wrote_is_never_taken_for_markup(page, tmp_path):
     assert squeezed(told.title) in squeezed(paper)
 
 
+@pytest.mark.slow
 def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
     from upright.experiments.laboratory import EXPERIMENTS, ExperimentResult, Session, book, date
 

@@ -69,6 +69,7 @@ SLOW_TO_FORGET = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", SLOW_TO_FORGET)
 def test_what_outlasts_a_period_is_remembered(what):
     """Moved a period at a time and in one piece, by commands put out blindly; without memory the motion is another."""

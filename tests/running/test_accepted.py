@@ -80,6 +80,7 @@ def test_silence_is_no_reason(bench, accept):
         up.run("RIG.toml", law="design/design.json", accept=accept)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("level", "accept"), [(NOT_TRUSTED, "the pendulum is held by a string"), (RESERVED, "")])
 def test_with_a_reason_or_some_trust_it_goes_as_far_as_the_wire(bench, level, accept):
     bench(level)

@@ -400,6 +400,7 @@ def test_a_rig_is_called_by_its_file_where_a_make_alone_describes_it_too(tmp_pat
     assert truth.name == make_rig("furuta").name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("start", "degrees"), [("", 3.0), ("0 deg", 0.0), ("5 deg", 5.0)])
 def test_a_twin_begins_off_upright_unless_somebody_says_otherwise(folder, tmp_path, start, degrees):
     answer = up.run(folder / "RIG.toml", law=folder / "design.json", duration=0.1, start=start, out=tmp_path)

@@ -51,6 +51,7 @@ def test_a_laboratory_that_is_not_there_is_said(tmp_path, options, sentence):
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.slow
 def test_the_shortest_experiment_is_told_as_numbers_and_page(tmp_path):
     steps = []
     done = lab(experiment="1a", rig="rectilinear", seed=2, out=tmp_path / "lab", progress=lambda s, x: steps.append(s))

@@ -121,7 +121,8 @@ def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | No
                     f"experiment {name} cannot be made on {make}, which {has}; "
                     "docs/howto/lab.md says what each asks of a rig."
                 )
-            raise BadInput(f"experiment {name} is for --rig {' or '.join(named[0].makes)}; {make} {has}.")
+            wanted_rig = " or ".join(named[0].makes) or "RIG.toml, a rig of your own"
+            raise BadInput(f"experiment {name} is for --rig {wanted_rig}; {make or 'a simulated one'} {has}.")
         wanted |= {e.key for e in named if e in there}
     if not requested:
         wanted = {e.key for e in there if e.key != QUICK}
@@ -135,7 +136,7 @@ def _there(make: str, live: LiveStand | None) -> list[Experiment]:
     """Experiments that a rig can have; all for the paper's."""
     if live is not None:
         return [e for e in EXPERIMENTS if e.on(live)]
-    return [e for e in EXPERIMENTS if not make or make in e.makes]
+    return [e for e in EXPERIMENTS if make in e.makes or (not make and e.makes)]
 
 
 def _needs(e: Experiment, make: str, live: LiveStand | None) -> list[str]:
@@ -397,9 +398,11 @@ def typed_again(session: Session, seed: int | None = None) -> str:
     shown = ["upright lab"]
     if session.make:
         shown.append(f"--rig {session.make}")
-    there = session.there
+    there = [e for e in session.there if e.key != QUICK]
     keys = {e.key for e in session.requested} | {t.experiment.key for t in session.results}
-    if len(keys) < len(there):
+    if QUICK in keys:
+        shown.append("--quick")
+    elif len(keys) < len(there):
         shown += [f"--experiment {e.key}" for e in there if e.key in keys]
     if seed:
         shown.append(f"--seed {seed}")

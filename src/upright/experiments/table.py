@@ -94,7 +94,7 @@ class Experiment:
 
     def make(self, requested: str) -> str:
         """Rig model that it is run on where one is requested, or none."""
-        return requested if requested in self.makes else self.makes[0]
+        return requested if requested in self.makes or not self.makes else self.makes[0]
 
 
 def _weighing(at: ExperimentInput) -> tuple[Chapter, bool]:

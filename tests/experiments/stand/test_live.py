@@ -101,6 +101,7 @@ def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):
     assert "travel" in found.ended
 
 
+@pytest.mark.slow
 def test_a_swing_up_is_told_from_the_middle_wherever_its_pulse_left_the_arm(tmp_path):
     plant = up.Furuta(m_p=0.1331, l_cg=0.185, r=0.152, J_d=7.1e-3, J_p=6.1e-4, J_a=2e-5, b_1=2e-3, b_2=4e-5)
     counts = {"value": 16_000.0, "unit": "1/rev", "source": "known"}

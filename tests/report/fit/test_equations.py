@@ -55,6 +55,7 @@ def test_a_term_whose_parameter_is_zero_is_left_out():
     assert "b_2θ˙" in text
 
 
+@pytest.mark.slow
 def test_a_force_in_pieces_is_written_with_its_conditions():
     x = read(equations(Bumpers))[0]
     assert "k(2(gap+x)ifgap+x≤0else0)" in x  # a spring that only pushes, and |x|^3 as -x^2 sgn(x) - 2 x |x|

@@ -49,6 +49,7 @@ def holding(up, pull, fade):
     return -(B.T @ P)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_pendulum_that_falls_away_from_where_it_is_kept_stands(drafted, sign):
     psi, theta, u = balanced()
@@ -79,6 +80,7 @@ def test_a_reversed_drive_is_told_upright_too(drafted):
     assert "sign = -1   # the first" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "reversed_"), [(100.0, False), (-100.0, True)])
 def test_a_drive_that_pulls_by_little_is_not_taken_for_reversed(drafted, scale, reversed_):
     """A hundred times the command for the same motion: 0.28 rad/s^2 per volt, which is above nothing."""
