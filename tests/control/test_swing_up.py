@@ -202,8 +202,6 @@ def oracle(t, y, z, p):
     n = dict(zip(PARAMETERS, p, strict=True))
     q, theta = y[0] * n["scale_q"], y[1] * n["scale_theta"]
     v, w = (n["memory"] * z[2 + i] + (1 - n["memory"]) * (x - z[i]) / n["period"] for i, x in enumerate((q, theta)))
-    if t < n["period"] / 2:  # a first sample has no difference
-        v, w = z[2], z[3]
 
     def upright(angle):
         return math.remainder(angle - math.pi, math.tau)

@@ -56,10 +56,8 @@ def swing_and_hold(t: float, y: Any, r: Any, z: Any, p: Any) -> tuple[Any, Any]:
      learn, pause, centre, damp, k0, k1, k2, k3, p00, p01, p02, p03, p11, p12, p13, p22, p23, p33, size, near, fast,
      away, fade, allowed, lost) = p  # fmt: skip
     q, theta = y[0] * scale_q, y[1] * scale_theta
-    v, w = z[2], z[3]
-    if t > 0.5 * period:  # of a first sample there is no difference
-        v = memory * v + (1.0 - memory) * (q - z[0]) / period
-        w = memory * w + (1.0 - memory) * (theta - z[1]) / period
+    v = memory * z[2] + (1.0 - memory) * (q - z[0]) / period
+    w = memory * z[3] + (1.0 - memory) * (theta - z[1]) / period
     s, c = sin(theta), cos(theta)
     phi = theta - pi - 2.0 * pi * floor((theta - pi) / (2.0 * pi) + 0.5)
     value = (

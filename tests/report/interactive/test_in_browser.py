@@ -13,6 +13,8 @@ from upright.report.fit.chapter import chapter
 from upright.report.html import write_html
 
 pytestmark = pytest.mark.slow
+TAIL, RELEASE, RESTARTED = 0, 1, 2
+"""Places on the page: the run that was predicted stands on its first screen."""
 SEEN = "document.querySelectorAll('figure:has(script.traces)')"
 
 
@@ -48,12 +50,12 @@ def told(page, place=0):
 def test_the_cursor_tells_what_the_record_holds_at_that_time(written, fit):
     run = fit.runs["release"]
     with opened(written) as (page, wrong):
-        show(page)
-        over = page.locator(".u-over").nth(2)
+        show(page, RELEASE)
+        over = page.locator(".u-over").nth(6)  # theta: each run has four panels
         box = over.bounding_box()
         for share in (0.2, 0.47, 0.9):
             page.mouse.move(box["x"] + share * box["width"], box["y"] + 20)
-            t, lines = told(page)
+            t, lines = told(page, RELEASE)
             i = int(np.argmin(np.abs(run.t - t)))
             assert t == pytest.approx(run.t[i], abs=1e-3)
             assert t == pytest.approx(share * 10, abs=0.02)
@@ -86,30 +88,32 @@ def test_a_drag_zooms_every_panel_to_the_same_seconds_and_a_double_click_shows_a
 def test_keys_move_the_cursor_sample_by_sample_and_zoom(written, fit):
     run = fit.runs["release"]
     with opened(written) as (page, wrong):
-        show(page)
-        page.locator(".panels").first.focus()
+        show(page, RELEASE)
+        page.locator(".panels").nth(RELEASE).focus()
         for _ in range(4):
             page.keyboard.press("ArrowRight")
-        until(page, "TRACES[0].heard.textContent !== ''")
-        t, lines = told(page)
+        until(page, "TRACES[1].heard.textContent !== ''")
+        t, lines = told(page, RELEASE)
         assert t == pytest.approx(run.t[3], abs=1e-4)
         assert lines[0][1] == pytest.approx(run.y[3, 0], abs=1e-4)
-        assert page.inner_text(".heard").startswith(f"time {float(f'{run.t[3]:.5g}')} s: measured")
+        assert (
+            page.locator(".heard").nth(RELEASE).inner_text().startswith(f"time {float(f'{run.t[3]:.5g}')} s: measured")
+        )
         page.keyboard.press("Shift+ArrowRight")
-        until(page, "TRACES[0].index === 13")
+        until(page, "TRACES[1].index === 13")
         page.keyboard.press("+")
-        until(page, "TRACES[0].plots.every((u) => u.scales.x.max - u.scales.x.min < 5.01)")
+        until(page, "TRACES[1].plots.every((u) => u.scales.x.max - u.scales.x.min < 5.01)")
         page.keyboard.press("Home")
-        until(page, "TRACES[0].plots.every((u) => u.scales.x.max - u.scales.x.min > 9.99)")
+        until(page, "TRACES[1].plots.every((u) => u.scales.x.max - u.scales.x.min > 9.99)")
         assert wrong == []
 
 
 def test_the_band_of_a_prediction_is_drawn_about_its_model(written, fit):
     with opened(written) as (page, wrong):
-        show(page, 1)
-        drawn = page.evaluate("TRACES[1].plots.map((u) => u.bands.length)")
+        show(page, TAIL)
+        drawn = page.evaluate("TRACES[0].plots.map((u) => u.bands.length)")
         assert drawn == [0, 0, 1, 1]  # psi has none
-        edges = np.array(page.evaluate("TRACES[1].plots[2].data.slice(1, 3)"))
+        edges = np.array(page.evaluate("TRACES[0].plots[2].data.slice(1, 3)"))
         np.testing.assert_allclose(edges[0] - edges[1], 0.04, atol=1e-4)
         np.testing.assert_allclose(edges.mean(axis=0), fit.runs["tail"].simulated[:, 1], atol=1e-4)
         assert wrong == []
@@ -117,7 +121,7 @@ def test_the_band_of_a_prediction_is_drawn_about_its_model(written, fit):
 
 def test_a_prediction_that_was_restarted_is_broken_there(written):
     with opened(written) as (page, _):
-        show(page, 2)
+        show(page, RESTARTED)
         gaps = page.evaluate("TRACES[2].gaps(TRACES[2].plots[0], 1, 0, TRACES[2].t.length - 1).length")
         assert gaps == 20  # 10 s in windows of 0.5 s, the last sample begins one
 
@@ -140,7 +144,7 @@ def test_paper_and_a_page_without_a_script_have_the_still_picture(written):
         assert page.locator(".still svg").first.is_visible()
     with opened(written) as (page, _):
         show(page)
-        assert not page.locator(".still").first.is_visible()
+        assert not page.locator("figure:has(script.traces) .still").first.is_visible()
         page.emulate_media(media="print")
-        assert page.locator(".still").first.is_visible()
+        assert page.locator("figure:has(script.traces) .still").first.is_visible()
         assert not page.locator(".moving").first.is_visible()
