@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from upright.control.braking import GRACE, SHARE
 from upright.errors import RigStopped
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
-from upright.rigs import Board, Limits, TwinPort
+from upright.rigs import Board, Limits, Mode, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
 
 TRAVEL = {"furuta": 1.2, "linear": 0.15}
@@ -102,11 +103,12 @@ def test_a_brake_that_drives_the_body_on_is_let_go(seed):
     assert speed < before + 1.3 * strongest * (GRACE + known.delay + known.lag + 6 * known.period), why
 
 
-def test_who_stops_it_by_hand_means_now():
+def started(pressed):
+    """A held Furuta twin whose stop is pressed when the list holds something; its port, rig and supervisor."""
     known = make_rig("furuta")
     limits = Limits(travel=(2.0, math.inf), speed=(math.inf,) * 2, start=(math.inf,) * 2, command=known.limit)
     port = TwinPort(known)
-    rig, pressed = Board(port), []
+    rig = Board(port)
     beside = Supervisor(rig, Duty(limits=limits, model=known, at="inverted", zero="hanging", lean=1.0, near=0.3),
                         stopped=lambda: "Stopped by hand." if pressed else "")  # fmt: skip
     beside.prepare()
@@ -114,6 +116,12 @@ def test_who_stops_it_by_hand_means_now():
     beside.aim(law_for(known))
     beside.start()
     port.let_go()
+    return port, rig, beside
+
+
+def test_who_stops_it_by_hand_means_now():
+    pressed = []
+    port, rig, beside = started(pressed)
     tick = rig.exchange(0.0)
     for _ in range(100):
         tick = rig.exchange(beside.step(tick))
@@ -125,3 +133,39 @@ def test_who_stops_it_by_hand_means_now():
         beside.step(tick)
     assert not any(outputs)
     assert rig.sample.tick >= last
+
+
+def test_a_first_sample_beyond_the_travel_ends_with_zero():
+    """Nothing has been seen then that a speed could be told from."""
+    _, rig, beside = started([])
+    first = rig.exchange(0.0)
+    beyond = replace(first, counts=(10**6, *first.counts[1:]))
+    with pytest.raises(RigStopped, match="beyond its travel"):
+        beside.step(beyond)
+    assert (rig.sample.mode, rig.sample.applied) == (Mode.FAULT, 0.0)
+
+
+def test_a_stop_that_is_pressed_while_it_brakes_ends_that():
+    pressed, brakes = [], []
+    port, rig, beside = started(pressed)
+    tick = rig.exchange(0.0)
+    for _ in range(100):
+        tick = rig.exchange(beside.step(tick))
+    port.push([12.0, 0.0])
+    exchange = rig.exchange
+
+    def within_a_step(u):
+        brakes.append(u)
+        pressed.append(True)
+        return exchange(u)
+
+    def driven(tick):
+        for _ in range(400):
+            tick = exchange(beside.step(tick))
+
+    rig.exchange = within_a_step
+    with pytest.raises(RigStopped):
+        driven(tick)
+    assert brakes[0] != 0.0
+    assert not any(brakes[1:])
+    assert rig.sample.applied == 0.0

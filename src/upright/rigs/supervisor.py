@@ -379,13 +379,13 @@ class Supervisor:
     def _brake(self, *, alone: bool) -> None:
         """Bring the driven body to rest while the drive obeys; whatever goes wrong meanwhile ends it."""
         braking, self._braking = self._braking, None
-        if braking is None or self._last is None:
+        if braking is None or self._last is None or not self._passed:
             return
         first, last = braking.momentum(self._passed, alone=alone), self._last
         with suppress(RigStopped):
             for _ in range(round(LONGEST / self.about.period)):
                 momentum = braking.momentum(self._passed, alone=alone)
-                if not braking.goes_on(momentum, first):
+                if self.stopped() or not braking.goes_on(momentum, first):
                     return
                 tick = self.rig.exchange(braking.command(momentum))
                 if tick.faults or tick.mode != Mode.HOST or tick.tick <= last.tick:
@@ -394,9 +394,11 @@ class Supervisor:
                 self._passed.append([q - target for q, target in zip(self.readings(tick), self.target, strict=True)])
 
     def _give_up(self, fault: Fault, why: str, *, body_trusted: bool = False) -> None:
-        if body_trusted or not fault & (UNSEEING | Fault.GAINS | Fault.STOP):  # who stops it by hand means now
-            self._brake(alone=body_trusted)
-        self.rig.estop()
+        try:
+            if body_trusted or not fault & (UNSEEING | Fault.GAINS | Fault.STOP):  # who stops it by hand means now
+                self._brake(alone=body_trusted)
+        finally:
+            self.rig.estop()
         if self._running is not None and not fault & UNSEEING and self._still_driven():
             fault |= Fault.MODEL
             why += " It gains energy at zero command: if it moves on, the drive does not obey; hit the button."
