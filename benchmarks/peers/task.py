@@ -57,7 +57,7 @@ class Task:
     """A rig to identify.
 
     `guesses` has a start for each number asked, `known` what everyone is given, `truth` the numbers of a twin; `offset`
-    says that the sensor's zero is asked too, `study` is the text that upright reads, whose log is `log.csv`.
+    says that the sensor's zero is asked too, `steps` how many integration steps a sample takes.
     """
 
     name: str
@@ -137,7 +137,7 @@ def _simulated(p: Mapping[str, float], u: Array, dt: float, stribeck: float) -> 
 
 
 def study_text(task: Task) -> str:
-    """The study that a user of upright writes for a task; its log is ``log.csv``."""
+    """The study that a user of upright writes for a task; its logs are called as its runs, ``fitted.csv``."""
     units = {"m_p": "kg", "l_cg": "m", "r": "m", "g": "m/s^2", "J_p": "kg m^2", "J_d": "kg m^2", "b_1": "N m s/rad",
              "b_2": "N m s/rad", "b_1c": "N m", "b_2c": "N m", "b_2q": "N m s^2/rad^2"}  # fmt: skip
     numbers: dict[str, Any] = {n: json.dumps(f"{v!r} {units[n]}") for n, v in task.known.items()}
