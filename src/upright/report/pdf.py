@@ -17,6 +17,7 @@ from upright.report.symbols import symbol
 
 _ROOT = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 _PROPERTY = re.compile(r"var\(--[\w-]+, ([^)]*)\)")
+_FIRST = re.compile(r"<svg.*?</svg>", re.DOTALL)
 _SHARE = re.compile(r'\sstyle="max-width:(\d+)%"')
 
 
@@ -46,8 +47,10 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
         """Pictures as files beside the template, formulas as trees of MathML's elements, states with their tone."""
         if isinstance(value, Picture):
             name = f"figure-{len(files)}.svg"
-            share = _SHARE.search(value.svg)
-            markup = _PROPERTY.sub(r"\1", _SHARE.sub("", value.svg))
+            first = _FIRST.search(value.svg)  # of a chart the drawing for a wide column
+            drawn = first[0] if first else value.svg
+            share = _SHARE.search(drawn)
+            markup = _PROPERTY.sub(r"\1", _SHARE.sub("", drawn))
             files[name] = markup.replace("<svg", _ROOT, 1).encode()
             plain = {"caption": value.caption, "description": value.description, "file": name}
             return {"kind": "Picture", **plain, "share": int(share[1]) if share else 100}

@@ -63,7 +63,7 @@ class Answer(Generic[V]):
         return tuple(self._drawings())
 
     def plot(self, name: str | None = None) -> Any:
-        """Matplotlib figure of the chapter's first picture, or of the one called `name`.
+        """The chapter's best picture, or the one called `name`, for a notebook: a matplotlib figure or a chart.
 
         Raises
         ------
@@ -73,7 +73,7 @@ class Answer(Generic[V]):
         drawings = self._drawings()
         if not drawings:
             raise BadInput(f"there is no picture of '{self.chapter.title}'; print it, or look into .numbers.")
-        name = name or next(iter(drawings))
+        name = name or self.chapter.best or next(iter(drawings))
         if name not in drawings:
             raise BadInput(f"plot draws {', '.join(drawings)}, got '{name}'; {nearest(name, drawings)}")
         draw = drawings[name].draw

@@ -10,14 +10,7 @@ import numpy as np
 from upright.basis import SIMULATED
 from upright.control.effort import QUIET_RMS, of_limit
 from upright.experiments.tracking_3 import tables
-from upright.experiments.tracking_3.figures import (
-    RootLocus,
-    Tradeoff,
-    loci_figure,
-    poles_figure,
-    steps_figure,
-    tradeoff_figure,
-)
+from upright.experiments.tracking_3.figures import Tradeoff, poles_chart, steps_figure, tradeoff_figure
 from upright.experiments.tracking_3.laws import AT, best_decay, root_locus, sampled
 from upright.experiments.tracking_3.pulses import FIT, STUDY
 from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, StepTrial, Tracking
@@ -27,6 +20,7 @@ from upright.paper.reproduce import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
 from upright.report.fit.tables import finding, parameter_table
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Step, Table
+from upright.report.planes import RootLocus, loci_chart
 from upright.report.rig import of_rig
 from upright.report.symbols import number, plain, typed
 
@@ -196,8 +190,8 @@ def _gains(result: Tracking, far: str) -> Part:
             "speeds are zero and errors the whole step, so that it is k_pf times the step, whatever the rig.",
             tables.gain_table(result),
             tables.shaft_pole_table(result),
-            Picture(
-                name="track-poles", draw=lambda: poles_figure(result),
+            poles_chart(result).picture(
+                "track-poles",
                 caption="Poles requested (rings), of the sampled, late loop on the fitted model (+) and the rig (x). "
                 "Delay and differences move the fast poles; the flexible mode stays where it was requested.",
                 description="Upper half of the s-plane for every set.",
@@ -331,7 +325,7 @@ def _reasons(result: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> 
     loci: list[RootLocus] = []
     for title, body, zeros in (("near encoder", 0, [-1 / rate, swing]), ("far encoder", 1, [-1 / rate])):
         loci.append(
-            RootLocus(title=title, tracks=root_locus(model, body, rate, rising),
+            RootLocus(title=f"{title}: imaginary part", gains=rising, tracks=root_locus(model, body, rate, rising),
                   marked=root_locus(model, body, rate, np.array([pd.k_pf]))[0], zeros=np.array(zeros, dtype=complex))
         )  # fmt: skip
     return [
@@ -341,8 +335,8 @@ def _reasons(result: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> 
             "outside of it. All as the loops run; dashed: the most that PD can have without natural damping and delay.",
             description="Decay of the slowest pole over static force per error.",
         ),
-        Picture(
-            name="track-loci", draw=lambda: loci_figure(loci, model.poles()),
+        loci_chart(loci, model.poles(), of="as kp rises", symbol="kp", marked="kp of the tuned PD").picture(
+            "track-loci",
             caption="Poles as kp rises, kd/kp as tuned. Poles and zeros alternate at the near encoder, and every "
             "branch stays left; at the far encoder the flexible mode goes right at once.",
             description="Two root loci, upper half plane.",
