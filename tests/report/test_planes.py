@@ -105,7 +105,7 @@ def test_the_unstable_half_and_no_more_is_tinted(done):
 def test_poles_beyond_the_picture_are_counted_below_it():
     kinds = [Poles(name="open", values=np.array([2.0 + 0j, -3.0]), mark="x"),
              Poles(name="fast", values=np.array([-14.0 + 0j, -2 + 60j, -2 - 60j, -1.0]), mark="+")]  # fmt: skip
-    assert pole_chart(kinds, frame=1).label == "real part [1/s]; 2 faster outside the picture"
+    assert pole_chart(kinds, frame=1).label == "real part [1/s]; 2 outside the picture"
     assert pole_chart(kinds).label == "real part [1/s]"
 
 

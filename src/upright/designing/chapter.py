@@ -15,7 +15,8 @@ from upright.gains.loop import response
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
-from upright.report.interactive.charts import Chart, Line, Panel
+from upright.records import Array
+from upright.report.interactive.charts import Axes, Chart, ChartLine
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
 from upright.report.planes import Poles, locus_chart, loop_chart, pole_chart
 from upright.report.rig import rig_drawing, rig_table
@@ -356,16 +357,20 @@ def _swing_picture(design: Designed) -> Picture:
     limit = design.request.limit
     reach = 1.25 * max(limit or 0.0, float(np.abs(u).max()))
     panels = [
-        Panel(title=plain(name), unit=unit, height=100.0, lines=(Line(name="", x=t, y=y[:, i], colour=f"q{i % 4}"),))
+        _over(t, y[:, i], plain(name), unit, f"q{i % 4}")
         for i, (name, unit) in enumerate(zip(design.rig.outputs, design.rig.output_units, strict=True))
     ]
-    command = Panel(
-        title="command", unit=design.rig.unit, height=100.0, lines=(Line(name="", x=t, y=u[:, 0], colour="effort"),),
+    command = replace(
+        _over(t, u[:, 0], "command", design.rig.unit, "effort"),
         limits=None if limit is None else (-reach, reach),
         levels=() if limit is None else ((limit, "limit"), (-limit, "")),
-    )  # fmt: skip
+    )
     return Chart(x="time", unit="s", panels=(*panels, command)).picture(
         "swing",
         caption="Linear model, continuous gains: the way back from the requested start, and the command it takes.",
         description=f"The command peaks at {design.peak:.3g} {design.rig.unit}.",
     )
+
+
+def _over(t: Array, values: Array, title: str, unit: str, colour: str) -> Axes:
+    return Axes(title=title, unit=unit, height=100.0, lines=(ChartLine(name="", x=t, y=values, colour=colour),))

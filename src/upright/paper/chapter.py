@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from upright.gains.factorization import Locus
-from upright.gains.requests import matched, written
+from upright.gains.requests import written
 from upright.paper.reproduce import STUDENTS, Regenerated, Reproduced
 from upright.report.drawing import BLUE, GREY, VERMILLION, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
@@ -105,13 +105,11 @@ def _polynomial(locus: Locus) -> str:
 
 def _locus_picture(table: Regenerated, name: str) -> Picture:
     efforts = np.geomspace(1e-4, 64.0, 400)
-    rows = [table.locus.poles(float(c)) for c in efforts]  # effort ever cheaper
-    for i in range(1, len(rows)):
-        rows[i] = matched(rows[i - 1], rows[i])
+    tracks = np.array([table.locus.poles(float(c)) for c in efforts])  # effort ever cheaper
     sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
     open_loop = np.roots(table.locus.a).astype(np.complex128)
     drawn = locus_chart(
-        np.array(rows), efforts, sets, open_loop, of="LQR poles as effort gets cheaper", symbol="1/R",
+        tracks, efforts, sets, open_loop, of="LQR poles as effort gets cheaper", symbol="1/R",
         origin="open loop, recovered",
     )  # fmt: skip
     return drawn.picture(

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from upright.gains.margins import Margins, Response
-from upright.gains.requests import Roots
+from upright.gains.requests import Roots, matched
 from upright.identification.model.fit import Pole
 from upright.records import Array
-from upright.report.interactive.charts import Chart, Line, Panel
+from upright.report.interactive.charts import Axes, Chart, ChartLine
 from upright.report.symbols import number
 
 _SAMPLES = 240
@@ -33,23 +33,20 @@ def upper(values: Roots) -> Roots:
     return values[values.imag > -1e-9 * np.maximum(1.0, np.abs(values))]
 
 
-def _line(poles: Poles) -> Line:
+def _line(poles: Poles) -> ChartLine:
     values = upper(poles.values)
-    return Line(name=poles.name, x=values.real, y=np.abs(values.imag), mark=poles.mark, colour=poles.colour)
+    return ChartLine(name=poles.name, x=values.real, y=np.abs(values.imag), mark=poles.mark, colour=poles.colour)
 
 
 def _plane(
-    panels: Mapping[str, Sequence[Line]],
-    left: float,
-    right: float,
-    high: float,
-    *,
-    note: str = "",
-    height: float = 240.0,
+    panels: Mapping[str, Sequence[ChartLine]], left: float, right: float, high: float, *, height: float = 240.0
 ) -> Chart:
-    """Upper half planes one below the other, each with what stands above its ordinate."""
+    """Upper half planes one below the other, each with what stands above its ordinate, and how many poles they miss."""
+    points = [line for lines in panels.values() for line in lines if line.mark and line.read]
+    beyond = sum(int(np.sum((line.x < left) | (line.x > right) | (line.y > high))) for line in points)
+    note = f"; {beyond} outside the picture" if beyond else ""
     shown = tuple(
-        Panel(title=title, unit="rad/s", lines=tuple(lines), limits=(-0.06 * high, high), height=height)
+        Axes(title=title, unit="rad/s", lines=tuple(lines), limits=(-0.06 * high, high), height=height)
         for title, lines in panels.items()
     )
     return Chart(x="real part", unit="1/s", note=note, panels=shown, limits=(left, right), plane="s")
@@ -61,14 +58,11 @@ def pole_chart(kinds: Sequence[Poles], cloud: Roots | None = None, *, cloud_of: 
     The view holds the first `frame` kinds; how many poles of the others lie outside is written below.
     """
     framed = np.concatenate([upper(k.values) for k in kinds[:frame]])
-    left, right, high = _view(framed)
     lines = [_line(k) for k in kinds]
     if cloud is not None and cloud.size:
         dots = upper(cloud)
-        lines.insert(0, Line(name=cloud_of, x=dots.real, y=dots.imag, mark=".", colour="q1", read=False))
-    beyond = sum(int(np.sum((line.x < left) | (line.x > right) | (line.y > high))) for line in lines if line.read)
-    note = f"; {beyond} faster outside the picture" if beyond else ""
-    return _plane({"imaginary part": lines}, left, right, high, note=note)
+        lines.insert(0, ChartLine(name=cloud_of, x=dots.real, y=dots.imag, mark=".", colour="q1", read=False))
+    return _plane({"imaginary part": lines}, *_view(framed))
 
 
 def _view(shown: Roots) -> tuple[float, float, float]:
@@ -80,7 +74,7 @@ def _view(shown: Roots) -> tuple[float, float, float]:
 
 def fitted_poles_chart(fitted: Mapping[str, Sequence[Pole]]) -> Chart:
     """Poles of a fitted rig at each equilibrium, with bars for the 95 % intervals of real and imaginary part."""
-    lines: list[Line] = []
+    lines: list[ChartLine] = []
     for (at, poles), mark, colour in zip(fitted.items(), "xosD^+" * 4, ("q0", "q1", "q2", "q3") * 6, strict=False):
         values = np.array([complex(p.real.value, p.imag.value) for p in poles])
         ends = [np.array([p.real.interval for p in poles]).T, np.array([p.imag.interval for p in poles]).T]
@@ -90,10 +84,10 @@ def fitted_poles_chart(fitted: Mapping[str, Sequence[Pole]]) -> Chart:
             for p in poles
         )
         lines.append(
-            Line(name=at, x=values.real, y=values.imag, mark=mark, colour=colour, notes=notes,
+            ChartLine(name=at, x=values.real, y=values.imag, mark=mark, colour=colour, notes=notes,
                  across=(ends[0][0], ends[0][1]), bars=(ends[1][0], ends[1][1]))
         )  # fmt: skip
-    every: Roots = np.concatenate([line.x + 1j * line.y for line in lines])
+    every = np.concatenate([line.x + 1j * line.y for line in lines]).astype(np.complex128)
     return _plane({"imaginary part": lines}, *_view(every))
 
 
@@ -102,14 +96,17 @@ def pole_panels(sets: Mapping[str, Sequence[Poles]], left: float, right: float, 
     return _plane({title: [_line(k) for k in kinds] for title, kinds in sets.items()}, left, right, high, height=110.0)
 
 
-def track_lines(tracks: Roots, weights: Array, *, of: str, symbol: str) -> list[Line]:
+def track_lines(tracks: Roots, weights: Array, *, of: str, symbol: str) -> list[ChartLine]:
     """Poles as one number changes, shape (N, n); the cursor tells the number, `weights`, as `symbol`."""
-    lines: list[Line] = []
+    lines: list[ChartLine] = []
     notes = tuple(f"{symbol} {number(w, 3)}" for w in weights.tolist())
-    for i, track in enumerate(tracks.T):
-        seen = track.imag > -1e-9 * np.maximum(1.0, np.abs(track))
-        y = np.where(seen, np.abs(track.imag), np.nan)
-        lines.append(Line(name=of if i == 0 else "", x=track.real, y=y, colour="q0", notes=notes))
+    rows = [tracks[0]]
+    for row in tracks[1:]:
+        rows.append(matched(rows[-1], row))
+    for i, track in enumerate(np.array(rows).T):
+        above = track.imag > -1e-9 * np.maximum(1.0, np.abs(track))
+        y = np.where(above, np.abs(track.imag), np.nan)
+        lines.append(ChartLine(name=of if i == 0 else "", x=track.real, y=y, colour="q0", notes=notes))
     return lines
 
 
@@ -177,10 +174,10 @@ def loop_chart(loop: Response, margins: Margins, period: float) -> Chart:
     return Chart(
         x="frequency", unit="rad/s", logarithmic=True, limits=(float(w[0]), float(w[-1])),
         panels=(
-            Panel(title="magnitude of the loop", unit="dB", levels=((0.0, ""),), places=turns,
-                  lines=(Line(name="", x=w, y=decibel, colour="ink"),)),
-            Panel(title="phase of the loop", unit="deg", step=90.0 if high - low > 200 else 45.0, places=gains,
+            Axes(title="magnitude of the loop", unit="dB", levels=((0.0, ""),), places=turns,
+                  lines=(ChartLine(name="", x=w, y=decibel, colour="ink"),)),
+            Axes(title="phase of the loop", unit="deg", step=90.0 if high - low > 200 else 45.0, places=gains,
                   levels=tuple((float(v), "") for v in range(-900, 901, 360) if low - 5 <= v <= high + 5),
-                  lines=(Line(name="", x=w, y=phase, colour="ink"),)),
+                  lines=(ChartLine(name="", x=w, y=phase, colour="ink"),)),
         ),
     )  # fmt: skip

@@ -180,8 +180,11 @@ def test_poles_are_those_of_rig_model_and_request_in_the_upper_half_plane():
         np.testing.assert_allclose(points(by_name["on the fitted model, sampled and late"]), upper(law.poles))
         np.testing.assert_allclose(points(by_name["on the rig"]), upper(loop_poles(other, law.law)))
         assert panel.limits[1] == pytest.approx(high)
-        beyond = int(np.sum(upper(loop_poles(other, law.law)).real < left))
-        assert panel.title == law.name + (f", {beyond} faster left out" if beyond else "") + ": imaginary part"
+        assert panel.title == f"{law.name}, imaginary part"
+    every = [(p, loop_poles(other, law.law), law.poles, law.requested) for law in (SET_1, SET_4, SUM)
+             for p in [RIG.linear(AT).poles()]]  # fmt: skip
+    beyond = sum(z.real < left or z.imag > high for kinds in every for p in kinds for z in upper(p))
+    assert drawing.note == f"; {beyond} outside the picture"
 
 
 def test_the_tradeoff_shows_the_curve_its_bounds_and_every_law():

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from tests.report.interactive.drawn import circles, curve, drawings
-from upright.report.interactive.charts import WIDTHS, Chart, Line, Panel, decades, ticks
+from upright.report.interactive.charts import WIDTHS, Axes, Chart, ChartLine, decade_ticks, round_ticks
 
 T = np.linspace(0.0, 2.0, 101)
-SINE = Line(name="sine", x=T, y=3.0 * np.sin(T), colour="q0")
-POINTS = Line(name="points", x=np.array([0.5, 1.5]), y=np.array([-1.0, 2.0]), mark="o", colour="q1")
+SINE = ChartLine(name="sine", x=T, y=3.0 * np.sin(T), colour="q0")
+POINTS = ChartLine(name="points", x=np.array([0.5, 1.5]), y=np.array([-1.0, 2.0]), mark="o", colour="q1")
 
 
 def chart(*lines, **how):
-    return Chart(x="time", unit="s", panels=(Panel(title="angle", unit="rad", lines=lines or (SINE, POINTS), **how),))
+    return Chart(x="time", unit="s", panels=(Axes(title="angle", unit="rad", lines=lines or (SINE, POINTS), **how),))
 
 
 def test_a_curve_and_its_points_lie_where_the_axes_say():
@@ -29,8 +29,8 @@ def test_a_curve_and_its_points_lie_where_the_axes_say():
 
 def test_logarithmic_axes_take_the_logarithm():
     w = np.geomspace(1.0, 100.0, 50)
-    line = Line(name="", x=w, y=1e3 / w**2, colour="q0")
-    drawn = Chart(x="frequency", panels=(Panel(title="gain", lines=(line,), logarithmic=True),), logarithmic=True)
+    line = ChartLine(name="", x=w, y=1e3 / w**2, colour="q0")
+    drawn = Chart(x="frequency", panels=(Axes(title="gain", lines=(line,), logarithmic=True),), logarithmic=True)
     x, y = curve(drawn, 0, "--q0")
     np.testing.assert_allclose(x[0] * 10, x[np.argmin(np.abs(y - y[0] / 100))], rtol=0.05)
     np.testing.assert_allclose(x**2 * y, 1e3, rtol=0.02)
@@ -38,7 +38,7 @@ def test_logarithmic_axes_take_the_logarithm():
 
 @pytest.mark.parametrize(("low", "high", "most"), [(0.0, 1.0, 5), (-3.2, 7.9, 4), (1e-4, 9e-4, 6), (-1e6, 2e6, 3)])
 def test_ticks_are_few_round_and_within(low, high, most):
-    at = np.array(ticks(low, high, most))
+    at = np.array(round_ticks(low, high, most))
     steps = np.diff(at)
     assert 2 <= at.size <= most + 1
     assert low <= at.min()
@@ -49,8 +49,8 @@ def test_ticks_are_few_round_and_within(low, high, most):
 
 
 def test_decades_are_labelled_at_one_two_and_five_where_there_is_room():
-    assert decades(1.0, 20.0, 9) == [1.0, 2.0, 5.0, 10.0, 20.0]
-    assert decades(1e-3, 1e3, 7) == pytest.approx([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3])
+    assert decade_ticks(1.0, 20.0, 9) == [1.0, 2.0, 5.0, 10.0, 20.0]
+    assert decade_ticks(1e-3, 1e3, 7) == pytest.approx([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3])
 
 
 def test_text_has_twelve_pixels_in_the_column_that_a_phone_of_360_leaves():
@@ -63,7 +63,7 @@ def test_text_has_twelve_pixels_in_the_column_that_a_phone_of_360_leaves():
 
 
 def test_what_is_not_finite_leaves_a_gap_and_is_no_value():
-    broken = Line(name="", x=np.array([0.0, 1.0, 2.0, 3.0, 4.0]), y=np.array([0.0, 1.0, np.nan, 1.0, np.inf]))
+    broken = ChartLine(name="", x=np.array([0.0, 1.0, 2.0, 3.0, 4.0]), y=np.array([0.0, 1.0, np.nan, 1.0, np.inf]))
     drawn = chart(broken)
     (line,) = json.loads(drawn.values())["panels"][0]["lines"]
     assert line["y"] == [0, 1, None, 1, None]
@@ -73,7 +73,7 @@ def test_what_is_not_finite_leaves_a_gap_and_is_no_value():
 
 def test_an_empty_or_constant_line_still_has_axes():
     for y in (np.zeros(0), np.zeros(3), np.full(3, np.nan)):
-        assert "<text" in chart(Line(name="", x=np.arange(y.size, dtype=float), y=y)).svg("a")
+        assert "<text" in chart(ChartLine(name="", x=np.arange(y.size, dtype=float), y=y)).svg("a")
 
 
 def test_limits_are_named_beside_their_line():
@@ -82,9 +82,9 @@ def test_limits_are_named_beside_their_line():
 
 
 def test_names_are_text_and_not_mark_up():
-    named = Line(name="<b>&", x=T, y=T)
+    named = ChartLine(name="<b>&", x=T, y=T)
     assert "<b>" not in chart(named, SINE).svg("a")
-    assert "</script" not in chart(Line(name="</script>", x=T, y=T)).values()
+    assert "</script" not in chart(ChartLine(name="</script>", x=T, y=T)).values()
 
 
 def test_colours_are_those_of_the_page_with_one_for_paper():

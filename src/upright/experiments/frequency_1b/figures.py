@@ -10,7 +10,7 @@ from upright.gains.requests import Roots
 from upright.identification.frequency.answer import FrequencyFit
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Array
-from upright.report.interactive.charts import Chart, Line, Panel
+from upright.report.interactive.charts import Axes, Chart, ChartLine
 from upright.report.symbols import plain, unit
 
 
@@ -33,38 +33,40 @@ def _bode(data: FrequencyResponse, answer: FrequencyFit | None, fine: Sequence[t
     phase = _measured(data.omega, turn, 1.96 * np.degrees(error), used)
     fits = (("least squares", "q0", "", "o"), ("simplex on dB", "q1", "7 4", "s"))
     for (name, colour, dash, _), (w, model) in zip(fits, fine, strict=False):
-        magnitude.append(Line(name=name, x=w, y=20 * np.log10(np.abs(model[:, j])), colour=colour, dash=dash))
+        magnitude.append(ChartLine(name=name, x=w, y=20 * np.log10(np.abs(model[:, j])), colour=colour, dash=dash))
         angle = np.degrees(np.unwrap(np.angle(model[:, j])))
         near = int(np.argmin(np.abs(w - data.omega[len(data) // 2])))
         angle -= 360 * np.round((angle[near] - turn[len(data) // 2]) / 360)
-        phase.append(Line(name=name, x=w, y=angle, colour=colour, dash=dash))
+        phase.append(ChartLine(name=name, x=w, y=angle, colour=colour, dash=dash))
     to, by = unit(data.units[j]), unit(data.units[-1])
     per = f" re 1 {to}/{by}" if to and by else ""
     of = f"{plain(data.outputs[j])} / {data.input}"
-    coherent = Line(name="measured", x=data.omega, y=data.coherence[:, j], mark="p")
+    coherent = ChartLine(name="measured", x=data.omega, y=data.coherence[:, j], mark="p")
     panels = [
-        Panel(title=f"{of}, magnitude", unit=f"dB{per}", lines=tuple(magnitude)),
-        Panel(title=f"{of}, phase", unit="deg", step=90.0 if np.ptp(turn) > 200 else 45.0, lines=tuple(phase)),
-        Panel(
+        Axes(title=f"{of}, magnitude", unit=f"dB{per}", lines=tuple(magnitude)),
+        Axes(title=f"{of}, phase", unit="deg", step=90.0 if np.ptp(turn) > 200 else 45.0, lines=tuple(phase)),
+        Axes(
             title="coherence", lines=(coherent,), limits=(min(0.9, float(coherent.y.min()) - 0.02), 1.02), height=80.0
         ),
     ]
     if answer is not None:
         at, models = answer.used, (answer.squares.way.model, answer.simplex.model)
         missed = tuple(
-            Line(name=name, x=at.omega, y=100 * np.abs(at.response[:, j] / model[:, j] - 1), colour=colour, mark=mark)
+            ChartLine(
+                name=name, x=at.omega, y=100 * np.abs(at.response[:, j] / model[:, j] - 1), colour=colour, mark=mark
+            )
             for (name, colour, _, mark), model in zip(fits, models, strict=True)
         )
-        panels.append(Panel(title="distance from each fit", unit="%", lines=missed, logarithmic=True, height=110.0))
+        panels.append(Axes(title="distance from each fit", unit="%", lines=missed, logarithmic=True, height=110.0))
     return Chart(x="frequency", unit="rad/s", logarithmic=True, panels=tuple(panels))
 
 
-def _measured(w: Array, y: Array, half: Array, used: np.ndarray) -> list[Line]:
+def _measured(w: Array, y: Array, half: Array, used: np.ndarray) -> list[ChartLine]:
     """Points with their bars, those that no fit used hollow and grey."""
     bars = (y - half)[used], (y + half)[used]
-    lines = [Line(name="measured", x=w[used], y=y[used], mark="p", bars=bars)]
+    lines = [ChartLine(name="measured", x=w[used], y=y[used], mark="p", bars=bars)]
     if not used.all():
-        lines.append(Line(name="measured, left out", x=w[~used], y=y[~used], mark="x", colour="ink-2"))
+        lines.append(ChartLine(name="measured, left out", x=w[~used], y=y[~used], mark="x", colour="ink-2"))
     return lines
 
 
@@ -78,7 +80,7 @@ def quality_chart(data: FrequencyResponse) -> Chart:
         (np.maximum(1 - data.coherence, 1e-9), "1 − coherence", ""),
         (data.distortion, "harmonics over fundamental", ""),
         (np.maximum(100 * data.error, 1e-5), "standard error", "%"),
-        (amplitude, "amplitude", "of each, in its unit"),
+        (amplitude, "amplitude", ""),
     )
     marks = (("o", "q0"), ("s", "q1"), ("^", "q2"), ("D", "q3"))
 
@@ -86,16 +88,16 @@ def quality_chart(data: FrequencyResponse) -> Chart:
         of = unit(data.units[j])
         return plain(data.outputs[j]) + (f" [{of}]" if of else "")
 
-    panels: list[Panel] = []
+    panels: list[Axes] = []
     for values, title, of in shown:
         lines = [
-            Line(name=name(j), x=data.omega, y=values[:, j], mark=marks[j % 4][0], colour=marks[j % 4][1])
+            ChartLine(name=name(j), x=data.omega, y=values[:, j], mark=marks[j % 4][0], colour=marks[j % 4][1])
             for j in range(len(data.outputs))
         ]
         if title == "amplitude":
             of_command = unit(data.units[-1])
             command = "command" + (f" [{of_command}]" if of_command else "")
-            lines.append(Line(name=command, x=data.omega, y=np.abs(data.drive), mark="x"))
+            lines.append(ChartLine(name=command, x=data.omega, y=np.abs(data.drive), mark="x"))
         if values.any():
-            panels.append(Panel(title=title, unit=of, lines=tuple(lines), logarithmic=True, height=100.0))
+            panels.append(Axes(title=title, unit=of, lines=tuple(lines), logarithmic=True, height=100.0))
     return Chart(x="frequency", unit="rad/s", logarithmic=True, panels=tuple(panels))

@@ -106,16 +106,15 @@ def poles_chart(result: Tracking) -> Chart:
     laws, open_loop = [o.law for o in result.sets], result.model.linear(AT).poles()
     left = 1.12 * min(float(law.requested.real.min()) for law in laws)
     high = 1.2 * max(float(np.abs(p.imag).max()) for p in (open_loop, *(law.requested for law in laws)))
-    sets: dict[str, list[Poles]] = {}
-    for law in laws:
-        on_rig = loop_poles(result.rig, law.law)
-        beyond = int(np.sum((on_rig.real < left) & (on_rig.imag > -1e-9)))
-        sets[f"{law.name}{f', {beyond} faster left out' if beyond else ''}: imaginary part"] = [
+    sets = {
+        f"{law.name}, imaginary part": [
             Poles(name="open loop", values=open_loop, mark="x", colour="ink-2"),
             Poles(name="requested", values=law.requested, mark="o"),
             Poles(name="on the fitted model, sampled and late", values=law.poles, mark="+", colour="q0"),
-            Poles(name="on the rig", values=on_rig, mark="x", colour="q1"),
+            Poles(name="on the rig", values=loop_poles(result.rig, law.law), mark="x", colour="q1"),
         ]
+        for law in laws
+    }
     return pole_panels(sets, left, -0.06 * left, high)
 
 

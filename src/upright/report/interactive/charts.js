@@ -78,6 +78,7 @@
       this.index = index;
       const text = this.chart.plane ? this.pole(this.stops[index]) : this.row(this.stops[index]);
       this.said.textContent = text;
+      this.said.style.minHeight = `${this.said.offsetHeight}px`;  // what stands below keeps its place
       this.still.setAttribute("aria-valuenow", index + 1);
       this.still.setAttribute("aria-valuetext", text);
       this.mark();
@@ -94,10 +95,10 @@
     }
 
     row(x) {
-      const { chart, unit, panels } = this.chart, many = panels.some((p) => p.lines.length > 1);
+      const { chart, unit, panels } = this.chart;
       const values = panels.map((p) => {
         const known = p.lines.map((l) => [l, this.value(l, x)]).filter(([, v]) => v !== null && v !== undefined);
-        return known.length ? `${p.title} ${known.map(([l, v]) => `${many && l.name ? `${l.name} ` : ""}${shown(v)}`).join(", ")}${p.unit ? ` ${p.unit}` : ""}` : "";
+        return known.length ? `${p.title} ${known.map(([l, v]) => `${p.lines.length > 1 ? `${l.name} ` : ""}${shown(v)}`).join(", ")}${p.unit ? ` ${p.unit}` : ""}` : "";
       });
       return `${chart} ${shown(x)}${unit ? ` ${unit}` : ""}: ${values.filter(Boolean).join("; ")}`;
     }

@@ -29,6 +29,8 @@ WIDTHS = {"wide": 640.0, "narrow": 330.0}
 """Units of a drawing: about the CSS pixels of the column that it stands in."""
 _TEXT, _LETTER = 13.0, 7.4  # units of text and of one of its letters, on average and with room to spare
 _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN, _ROW = 50.0, 14.0, 20.0, 40.0, 8.0, 19.0
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MANY = 12  # points of a line from which on their marks are small
 _MARKS = {
     "x": "M{l} {t}L{r} {b}M{l} {b}L{r} {t}", "+": "M{x} {t}V{b}M{l} {y}H{r}", "s": "M{l} {t}H{r}V{b}H{l}Z",
     "D": "M{x} {t}L{r} {y}L{x} {b}L{l} {y}Z", "^": "M{x} {t}L{r} {b}H{l}Z",
@@ -36,7 +38,7 @@ _MARKS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Line:
+class ChartLine:
     """One curve, or points.
 
     Attributes
@@ -72,14 +74,14 @@ class Line:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Panel:
+class Axes:
     """Lines over the abscissa that all panels of a chart share.
 
     Attributes
     ----------
     title, unit : str
         Of the ordinate.
-    lines : tuple of Line
+    lines : tuple of ChartLine
     limits : (float, float), optional
         Of the ordinate; what the lines need when None.
     logarithmic : bool
@@ -93,7 +95,7 @@ class Panel:
 
     title: str
     unit: str = ""
-    lines: tuple[Line, ...]
+    lines: tuple[ChartLine, ...]
     limits: tuple[float, float] | None = None
     logarithmic: bool = False
     step: float = 0.0
@@ -110,7 +112,7 @@ class Chart:
     ----------
     x, unit : str
         Of the abscissa.
-    panels : tuple of Panel
+    panels : tuple of Axes
     limits : (float, float), optional
         Of the abscissa; what the lines need when None.
     logarithmic : bool
@@ -123,7 +125,7 @@ class Chart:
 
     x: str
     unit: str = ""
-    panels: tuple[Panel, ...]
+    panels: tuple[Axes, ...]
     limits: tuple[float, float] | None = None
     logarithmic: bool = False
     plane: str = ""
@@ -132,10 +134,9 @@ class Chart:
     spans: tuple[tuple[float, float], ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        every = [line.x for p in self.panels for line in p.lines]
-        object.__setattr__(
-            self, "span", self.limits or _range(every, self.logarithmic, room=0.0 if not self.plane else 0.06)
-        )
+        lines = [line for p in self.panels for line in p.lines]
+        room = 0.03 if any(line.mark for line in lines) else 0.0
+        object.__setattr__(self, "span", self.limits or _range([line.x for line in lines], self.logarithmic, room))
         spans = tuple(p.limits or _range([y for line in p.lines for y in (line.y, *(line.bars or ()))], p.logarithmic)
                       for p in self.panels)  # fmt: skip
         object.__setattr__(self, "spans", spans)
@@ -175,7 +176,7 @@ class Chart:
         return picture_in_notebook(self.picture("chart", caption="", description=self.label))
 
 
-def ticks(low: float, high: float, most: int) -> list[float]:
+def round_ticks(low: float, high: float, most: int) -> list[float]:
     """Multiples of 1, 2 or 5 times a power of ten from `low` to `high`, at most so many."""
     step = _step((high - low) / max(most, 1))
     return [round(k * step, 12) for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
@@ -186,7 +187,7 @@ def _step(least: float) -> float:
     return next((m * power for m in (1, 2, 5) if m * power >= least * (1 - 1e-9)), 10 * power)
 
 
-def decades(low: float, high: float, most: int) -> list[float]:
+def decade_ticks(low: float, high: float, most: int) -> list[float]:
     """1, 2 and 5 times powers of ten from `low` to `high`; powers alone, and fewer of them, where there is no room."""
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
     for within in ((1, 2, 5), (1, 3), (1,)):
@@ -219,9 +220,11 @@ def _colour(name: str) -> str:
     return f"var(--{name}, {COLOURS[name]})"
 
 
-def _said(value: float) -> str:
-    text = f"{value:.6g}" if 1e-3 <= abs(value) < 1e5 or value == 0 else f"{value:.3g}"
-    return text.replace("-", "−")
+def _label(value: float) -> str:
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.6g}".replace("-", "−")
+    digit, _, power = f"{value:.0e}".partition("e")
+    return ("" if digit == "1" else f"{digit}·") + "10" + str(int(power)).translate(_RAISED)
 
 
 class _Drawing:
@@ -275,7 +278,7 @@ class _Drawing:
             np.asarray(values, dtype=np.float64), self.chart.span, self.chart.logarithmic, _LEFT, self.across
         )
 
-    def _panel(self, panel: Panel, span: tuple[float, float], top: float, high: float, key: str, *, last: bool) -> None:
+    def _panel(self, panel: Axes, span: tuple[float, float], top: float, high: float, key: str, *, last: bool) -> None:
         chart, right, bottom = self.chart, _LEFT + self.across, top + high
 
         def down(values: ArrayLike) -> Array:
@@ -292,16 +295,16 @@ class _Drawing:
             ]
             ordinates = ordinates[:: max(1, -(-len(ordinates) // most))]
         else:
-            ordinates = (decades if panel.logarithmic else ticks)(*span, most)
+            ordinates = (decade_ticks if panel.logarithmic else round_ticks)(*span, most)
         for value, y in zip(ordinates, down(ordinates).tolist(), strict=True):
             self._shape(f"M{_LEFT:g} {y:.1f}H{right:g}", "line")
-            self._text(_LEFT - 6, y + 4.5, _said(value), anchor="end")
+            self._text(_LEFT - 6, y + 4.5, _label(value), anchor="end")
         most = int(self.across / 44)
-        abscissae = (decades if chart.logarithmic else ticks)(*chart.span, most)
+        abscissae = (decade_ticks if chart.logarithmic else round_ticks)(*chart.span, most)
         for value, x in zip(abscissae, self._x(abscissae).tolist(), strict=True):
             self._shape(f"M{x:.1f} {top:g}V{bottom:g}", "line")
             if last:
-                self._text(x, bottom + 16, _said(value), anchor="middle")
+                self._text(x, bottom + 16, _label(value), anchor="middle")
         if chart.plane:
             self._shape(
                 f"M{_LEFT:g} {float(down(0.0)):.1f}H{right:g}M{float(self._x(0.0)):.1f} {top:g}V{bottom:g}",
@@ -346,7 +349,7 @@ class _Drawing:
                 if math.isfinite(a + b + c + d))  # fmt: skip
         self._shape("".join(bars), colour, width=1.1)
 
-    def _line(self, line: Line, x: Array, y: Array) -> None:
+    def _line(self, line: ChartLine, x: Array, y: Array) -> None:
         if not line.mark:
             for path in _pieces(x, y, thin=0.3):
                 self._shape(path, line.colour, width=1.6, dash=line.dash)
@@ -357,13 +360,13 @@ class _Drawing:
                 "".join(sorted({f"M{a:.1f} {b:.1f}h0" for a, b in points})), line.colour, width=3.0, opacity=0.55
             )
             return
+        w = 5.0 if len(points) <= _MANY else 3.4
         for a, b in points:
             if line.mark in "op":
-                r, inside = (5.5, "none") if line.mark == "o" else (3.2, _colour("raised"))
+                r, inside = (1.1 * w, "none") if line.mark == "o" else (3.2, _colour("raised"))
                 ring = f'stroke="{_colour(line.colour)}" stroke-width="1.6" fill="{inside}"'
-                self.out.append(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{r}" {ring}/>')
+                self.out.append(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{r:.2g}" {ring}/>')
                 continue
-            w = 5.0
             path = _MARKS[line.mark].format(
                 x=f"{a:.1f}", y=f"{b:.1f}", l=f"{a - w:.1f}", r=f"{a + w:.1f}", t=f"{b - w:.1f}", b=f"{b + w:.1f}"
             )
