@@ -47,6 +47,6 @@ def window_sentence(parts: Iterable[Part], first: float, last: float) -> str:
 
 
 def digits_within(digits: int, first: float, last: float) -> int:
-    """Digits that tell instants from `first` to `last` [s] apart as `digits` do those of a clock that begins at zero."""
+    """Digits that tell instants from `first` to `last` [s] apart as `digits` do on a clock that begins at zero."""
     largest, span = max(abs(first), abs(last)), last - first
     return digits + max(0, math.ceil(math.log10(largest / span) - 1e-9)) if 0 < span < largest else digits
