@@ -102,7 +102,7 @@ def test_a_fit_does_not_depend_on_the_order_of_its_runs(case):
         assert apart(case, [second, first, last]) == []
 
 
-@pytest.mark.parametrize("case", CASES.keys() - {"filtered"})
+@pytest.mark.parametrize("case", [case for case in CASES if case != "filtered"])
 def test_a_fit_is_that_of_the_rig_in_a_mirror(case):
     """Equations of both plants are odd, so runs with every sign turned are runs of the same rig."""
     there, runs = CASES[case]
