@@ -122,11 +122,11 @@ def templates_of(package: str) -> Environment:
         loader=PackageLoader(package, "."), undefined=StrictUndefined, finalize=_cell, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    templates.filters |= {
+    templates.filters.update({
         "number": number, "percent": percent, "symbol": plain, "typed": typed, "unit": unit, "fmt": format,
         "degrees": math.degrees, "in_percent": in_percent, "parameter": Symbol, "sentence": _sentence,
-    }  # fmt: skip
-    templates.tests |= {"finite": math.isfinite}
+    })  # fmt: skip
+    templates.tests.update({"finite": math.isfinite})
     return templates
 
 
