@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import inspect
 import warnings
 from collections.abc import Callable, Mapping
 from functools import wraps
@@ -56,8 +56,8 @@ def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:
 
 def outside() -> int:
     """Level, for `warnings.warn`, of the first caller that is not of this package."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "upright":
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "upright":
         frame, level = frame.f_back, level + 1
     return level
 

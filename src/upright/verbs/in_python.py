@@ -37,11 +37,11 @@ def worded(sentence: str, command: Command) -> str:
     arguments = {option: name for name in command.names for option in command.options(name)}
     arguments.setdefault("-o", "out")
 
-    def argument(found: re.Match[str]) -> str:
-        option, value = found.groups()
+    def argument(match: re.Match[str]) -> str:
+        option, value = match.groups()
         name = arguments.get(option, option[2:].replace("-", "_"))
         if not name or name in command.flags:
-            return found[0]
+            return match[0]
         return f"{name}={value}" if value else name
 
     pieces = _COMMAND_LINE.split(sentence)
