@@ -14,10 +14,13 @@ import numpy as np
 import pytest
 
 from benchmarks.doctored import PLANTS, batch
+from tests.alike import differences
+from upright.identification import Run
 from upright.readers.inspection import inspect_record
 from upright.records import Record
 from upright.study.draft.compare import explained
 from upright.study.draft.draft import draft
+from upright.study.load import Study, load_study
 from upright.units import parse
 
 DT = 2.0**-8
@@ -91,6 +94,33 @@ def test_a_draft_has_the_same_numbers_of_a_log_in_other_units(plant, k):
         assert theirs["unit"] == unit
         assert theirs.get("offset", 0.0) == pytest.approx(per * sensor.get("offset", 0.0), rel=1e-6)
         assert theirs.get("counts_per_rev") == sensor.get("counts_per_rev")
+
+
+def loaded(record: Record, plant: str) -> Study:
+    text = draft(record, inspect_record(record), Path("log.csv"), Path("study.toml"), plant=plant)
+    return load_study(Path("study.toml"), text=text, records={"log.csv": record})
+
+
+def common(run: Run, other: Run) -> tuple[Run, Run]:
+    """Samples of both: five digits of a window may leave out its last sample, or its first."""
+    first, last = max(run.t[0], other.t[0]), min(run.t[-1], other.t[-1])
+    assert last - first > run.t[-1] - run.t[0] - 3 * DT
+    return tuple(r.samples(slice(*np.searchsorted(r.t, [first, last + DT / 2]))) for r in (run, other))
+
+
+@pytest.mark.parametrize(("plant", "k"), CASES)
+def test_runs_are_the_same_on_another_clock_and_in_other_units(plant, k):
+    """In SI, to the six digits with which a draft writes the zero of a sensor."""
+    record = log(plant, k)
+    here = loaded(record, plant)
+    for away, other in ((LATER, replace(record, t=record.t + LATER)), (0.0, in_units(record))):
+        study = loaded(other, plant)
+        assert list(differences(here.model, study.model, rel=1e-5)) == []
+        for ours, run in zip(here.runs, study.runs, strict=True):
+            assert run.quanta == pytest.approx(ours.quanta, rel=1e-3)  # four digits
+            both = common(ours, replace(run, t=run.t - away, resolution=ours.resolution))
+            found = differences(*both, rel=1e-6, near=1e-5 * float(np.ptp(ours.y)))
+            assert [path for path in found if not path.startswith((".source", ".record"))] == []
 
 
 @pytest.mark.parametrize(("plant", "k"), CASES)
