@@ -177,7 +177,7 @@ def test_an_interrupted_search_is_judged_on_its_prediction_alone() -> None:
     told = judged(interrupted=True, converged=False, estimates={"J_p": firm()})
     assert [a.answer for a in told] == ["no", "not tested", "not tested"]
     assert told[0].reasons == ("The search was interrupted; this is its best so far.",)
-    assert told[0].headline.endswith("Not to be trusted as it stands.")
+    assert told[0].headline.endswith("Do not rely on this model yet.")
     assert {a.headline for a in told[1:]} == {"Not evaluated: interrupted."}
     bad = judged(interrupted=True, estimates={"J_p": firm(status="poorly determined")})[1]
     assert bad.answer == "no"

@@ -166,7 +166,7 @@ def _predicts(evidence: Evidence) -> Judgement:
         )
     if against:
         return Judgement(
-            question=PREDICTS, answer="no", headline=f"{explains}Not to be trusted as it stands.",
+            question=PREDICTS, answer="no", headline=f"{explains}Do not rely on this model yet.",
             reasons=(*against, *notes),
         )  # fmt: skip
     if not predicted:
