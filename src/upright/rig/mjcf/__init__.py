@@ -17,9 +17,9 @@ from upright.physics import Plant, name_of
 from upright.rig.hardware import Hardware
 from upright.rig.mjcf.axes import Axes
 from upright.rig.mjcf.bodies import OWN, Bodies
-from upright.rig.mjcf.comparison import compare
+from upright.rig.mjcf.comparison import check_accelerations
 from upright.rig.mjcf.drive import read_drive
-from upright.rig.mjcf.plants import recognise
+from upright.rig.mjcf.plants import plant_in
 from upright.rig.rig import Rig
 
 
@@ -55,13 +55,13 @@ def read_mjcf(path: Path) -> FromMjcf:
         When MuJoCo is missing or cannot read the file, or the file has what none of our plants has.
     """
     bodies = Bodies(path)
-    kind, values, axes = recognise(bodies)
+    kind, values, axes = plant_in(bodies)
     names = kind.names()
     try:
         plant = kind(**values)
     except ImpossiblePhysics as error:
         raise bodies.error(f"as a {name_of(kind)} it would be impossible: {str(error).rstrip('.')}; {OWN}") from error
-    left_out = [*compare(bodies, plant, axes), *_friction_without_place(bodies, plant, axes)]
+    left_out = [*check_accelerations(bodies, plant, axes), *_friction_without_place(bodies, plant, axes)]
     plant = _with_dry_friction(bodies, plant, axes)
     (gain, command), entries, of_drive = read_drive(bodies, plant, axes)
     left_out += [*bodies.left_out(axes.order[1:]), *of_drive]

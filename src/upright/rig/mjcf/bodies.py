@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ class Bodies:
     def __init__(self, path: Path) -> None:
         regular(path)
         try:
-            import mujoco
+            mujoco: Any = import_module("mujoco")
         except ImportError:
             raise BadInput(f"to read {path.name}, MuJoCo is needed: pip install 'upright[mujoco]'.") from None
         self.mujoco, self.file = mujoco, path.name

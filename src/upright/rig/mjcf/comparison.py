@@ -13,7 +13,7 @@ AGREEMENT = 1e-6
 """How far the plant's accelerations may be from MuJoCo's, of the largest, where a file's numbers are rounded."""
 
 
-def compare(bodies: Bodies, plant: Plant, axes: Axes) -> list[str]:
+def check_accelerations(bodies: Bodies, plant: Plant, axes: Axes) -> list[str]:
     """Refuse a plant that accelerates otherwise than the file's bodies, at 20 random states and forces."""
     rng, order = np.random.default_rng(24), [*axes.order]
     n = len(order)

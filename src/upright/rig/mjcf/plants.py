@@ -16,7 +16,7 @@ from upright.rig.mjcf.bodies import HINGE, OWN, SLIDE, Bodies, actuated
 Recognised = tuple[type[Plant], dict[str, float], Axes]
 
 
-def recognise(bodies: Bodies) -> Recognised:
+def plant_in(bodies: Bodies) -> Recognised:
     """Kind of plant, its numbers without dry friction, its coordinates."""
     kinds, parents = bodies.kinds, bodies.parents()
     row = parents == list(range(-1, len(kinds) - 1))
