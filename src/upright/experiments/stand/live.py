@@ -53,7 +53,9 @@ class LiveStand(TestStand):
         Why laws from a fit that is not trusted drive hardware all the same; without it they are not armed.
     """
 
-    simulated = False
+    attended = True
+    starts_anywhere = False
+    may_fall = False
     file: RigFile
     person: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
@@ -219,7 +221,7 @@ def live_stand(
     return LiveStand(
         file=file, rig=rig, true_rig=replace(truth, name=rig.name), make=_make(file), vendor=file.vendor,
         performed=file.performed, zero=file.zero, room=limits.travel[list(units).index(rig.plant.inputs[0].on)],
-        fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
+        speeds=limits.speed, fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
         person=person if file.hardware else nobody, watching=watching, accept=accept,
     )  # fmt: skip
 
