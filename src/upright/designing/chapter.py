@@ -16,7 +16,7 @@ from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
 from upright.records import Array
-from upright.report.interactive.charts import Axes, Chart, ChartLine
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
 from upright.report.planes import Poles, locus_chart, loop_chart, pole_chart
 from upright.report.rig import rig_drawing, rig_table
@@ -372,5 +372,5 @@ def _swing_picture(design: Designed) -> Picture:
     )
 
 
-def _over(t: Array, values: Array, title: str, unit: str, colour: str) -> Axes:
-    return Axes(title=title, unit=unit, height=100.0, lines=(ChartLine(name="", x=t, y=values, colour=colour),))
+def _over(t: Array, values: Array, title: str, unit: str, colour: str) -> ChartPanel:
+    return ChartPanel(title=title, unit=unit, height=100.0, lines=(ChartLine(name="", x=t, y=values, colour=colour),))

@@ -12,7 +12,7 @@ from upright.gains.margins import Margins, Response
 from upright.gains.requests import Roots, matched
 from upright.identification.model.fit import Pole
 from upright.records import Array
-from upright.report.interactive.charts import Axes, Chart, ChartLine
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.symbols import number
 
 _SAMPLES = 240
@@ -46,7 +46,7 @@ def _plane(
     beyond = sum(int(np.sum((line.x < left) | (line.x > right) | (line.y > high))) for line in points)
     note = f"; {beyond} outside the picture" if beyond else ""
     shown = tuple(
-        Axes(title=title, unit="rad/s", lines=tuple(lines), limits=(-0.06 * high, high), height=height)
+        ChartPanel(title=title, unit="rad/s", lines=tuple(lines), limits=(-0.06 * high, high), height=height)
         for title, lines in panels.items()
     )
     return Chart(x="real part", unit="1/s", note=note, panels=shown, limits=(left, right), plane="s")
@@ -174,9 +174,9 @@ def loop_chart(loop: Response, margins: Margins, period: float) -> Chart:
     return Chart(
         x="frequency", unit="rad/s", logarithmic=True, limits=(float(w[0]), float(w[-1])),
         panels=(
-            Axes(title="magnitude of the loop", unit="dB", levels=((0.0, ""),), places=turns,
+            ChartPanel(title="magnitude of the loop", unit="dB", levels=((0.0, ""),), places=turns,
                   lines=(ChartLine(name="", x=w, y=decibel, colour="ink"),)),
-            Axes(title="phase of the loop", unit="deg", step=90.0 if high - low > 200 else 45.0, places=gains,
+            ChartPanel(title="phase of the loop", unit="deg", step=90.0 if high - low > 200 else 45.0, places=gains,
                   levels=tuple((float(v), "") for v in range(-900, 901, 360) if low - 5 <= v <= high + 5),
                   lines=(ChartLine(name="", x=w, y=phase, colour="ink"),)),
         ),

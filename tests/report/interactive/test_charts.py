@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.report.interactive.drawn import circles, curve, drawings
-from upright.report.interactive.charts import WIDTHS, Axes, Chart, ChartLine, decade_ticks, round_ticks
+from upright.report.interactive.charts import WIDTHS, Chart, ChartLine, ChartPanel, decade_ticks, round_ticks
 
 T = np.linspace(0.0, 2.0, 101)
 SINE = ChartLine(name="sine", x=T, y=3.0 * np.sin(T), colour="q0")
@@ -17,7 +17,9 @@ POINTS = ChartLine(name="points", x=np.array([0.5, 1.5]), y=np.array([-1.0, 2.0]
 
 
 def chart(*lines, **how):
-    return Chart(x="time", unit="s", panels=(Axes(title="angle", unit="rad", lines=lines or (SINE, POINTS), **how),))
+    return Chart(
+        x="time", unit="s", panels=(ChartPanel(title="angle", unit="rad", lines=lines or (SINE, POINTS), **how),)
+    )
 
 
 def test_a_curve_and_its_points_lie_where_the_axes_say():
@@ -30,7 +32,7 @@ def test_a_curve_and_its_points_lie_where_the_axes_say():
 def test_logarithmic_axes_take_the_logarithm():
     w = np.geomspace(1.0, 100.0, 50)
     line = ChartLine(name="", x=w, y=1e3 / w**2, colour="q0")
-    drawn = Chart(x="frequency", panels=(Axes(title="gain", lines=(line,), logarithmic=True),), logarithmic=True)
+    drawn = Chart(x="frequency", panels=(ChartPanel(title="gain", lines=(line,), logarithmic=True),), logarithmic=True)
     x, y = curve(drawn, 0, "--q0")
     np.testing.assert_allclose(x[0] * 10, x[np.argmin(np.abs(y - y[0] / 100))], rtol=0.05)
     np.testing.assert_allclose(x**2 * y, 1e3, rtol=0.02)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.live.browser import opened
 from upright.report.html import write_html
-from upright.report.interactive.charts import Axes, Chart, ChartLine
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.page import Chapter, Part
 from upright.report.planes import Poles, pole_chart
 
@@ -18,8 +18,8 @@ pytestmark = pytest.mark.slow
 T = np.linspace(0.0, 10.0, 201)
 MOTION = Chart(
     x="time", unit="s",
-    panels=(Axes(title="angle", unit="rad", lines=(ChartLine(name="", x=T, y=np.sin(T), colour="q0"),)),
-            Axes(title="speed", unit="rad/s", lines=(ChartLine(name="", x=T, y=np.cos(T), colour="q1"),))),
+    panels=(ChartPanel(title="angle", unit="rad", lines=(ChartLine(name="", x=T, y=np.sin(T), colour="q0"),)),
+            ChartPanel(title="speed", unit="rad/s", lines=(ChartLine(name="", x=T, y=np.cos(T), colour="q1"),))),
 )  # fmt: skip
 POLES = np.array([-3 + 4j, -3 - 4j, -12.0, 2.0])
 PLANE = pole_chart([Poles(name="loop", values=POLES, mark="x")])

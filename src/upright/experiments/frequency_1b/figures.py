@@ -10,7 +10,7 @@ from upright.gains.requests import Roots
 from upright.identification.frequency.answer import FrequencyFit
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Array
-from upright.report.interactive.charts import Axes, Chart, ChartLine
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.symbols import plain, unit
 
 
@@ -43,9 +43,9 @@ def _bode(data: FrequencyResponse, answer: FrequencyFit | None, fine: Sequence[t
     of = f"{plain(data.outputs[j])} / {data.input}"
     coherent = ChartLine(name="measured", x=data.omega, y=data.coherence[:, j], mark="p")
     panels = [
-        Axes(title=f"{of}, magnitude", unit=f"dB{per}", lines=tuple(magnitude)),
-        Axes(title=f"{of}, phase", unit="deg", step=90.0 if np.ptp(turn) > 200 else 45.0, lines=tuple(phase)),
-        Axes(
+        ChartPanel(title=f"{of}, magnitude", unit=f"dB{per}", lines=tuple(magnitude)),
+        ChartPanel(title=f"{of}, phase", unit="deg", step=90.0 if np.ptp(turn) > 200 else 45.0, lines=tuple(phase)),
+        ChartPanel(
             title="coherence", lines=(coherent,), limits=(min(0.9, float(coherent.y.min()) - 0.02), 1.02), height=80.0
         ),
     ]
@@ -57,7 +57,9 @@ def _bode(data: FrequencyResponse, answer: FrequencyFit | None, fine: Sequence[t
             )
             for (name, colour, _, mark), model in zip(fits, models, strict=True)
         )
-        panels.append(Axes(title="distance from each fit", unit="%", lines=missed, logarithmic=True, height=110.0))
+        panels.append(
+            ChartPanel(title="distance from each fit", unit="%", lines=missed, logarithmic=True, height=110.0)
+        )
     return Chart(x="frequency", unit="rad/s", logarithmic=True, panels=tuple(panels))
 
 
@@ -88,7 +90,7 @@ def quality_chart(data: FrequencyResponse) -> Chart:
         of = unit(data.units[j])
         return plain(data.outputs[j]) + (f" [{of}]" if of else "")
 
-    panels: list[Axes] = []
+    panels: list[ChartPanel] = []
     for values, title, of in shown:
         lines = [
             ChartLine(name=name(j), x=data.omega, y=values[:, j], mark=marks[j % 4][0], colour=marks[j % 4][1])
@@ -99,5 +101,5 @@ def quality_chart(data: FrequencyResponse) -> Chart:
             command = "command" + (f" [{of_command}]" if of_command else "")
             lines.append(ChartLine(name=command, x=data.omega, y=np.abs(data.drive), mark="x"))
         if values.any():
-            panels.append(Axes(title=title, unit=of, lines=tuple(lines), logarithmic=True, height=100.0))
+            panels.append(ChartPanel(title=title, unit=of, lines=tuple(lines), logarithmic=True, height=100.0))
     return Chart(x="frequency", unit="rad/s", logarithmic=True, panels=tuple(panels))

@@ -3,7 +3,6 @@
 
 (() => {
   const shown = (v) => (v === null || v === undefined ? "–" : String(Number(v.toPrecision(4))).replace("-", "\u2212"));
-  const SVG = "http://www.w3.org/2000/svg";
 
   class Cursor {
     constructor(figure, chart) {
@@ -113,7 +112,7 @@
       for (const old of this.still.querySelectorAll(".cursor")) old.remove();
       const seen = this.index === null ? null : this.seen();
       if (!seen) return;
-      const stop = this.stops[this.index], group = document.createElementNS(SVG, "g");
+      const stop = this.stops[this.index], SVG = seen.svg.namespaceURI, group = document.createElementNS(SVG, "g");
       group.setAttribute("class", "cursor");
       const add = (tag, attributes) => {
         const e = document.createElementNS(SVG, tag);

@@ -74,7 +74,7 @@ class ChartLine:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Axes:
+class ChartPanel:
     """Lines over the abscissa that all panels of a chart share.
 
     Attributes
@@ -112,7 +112,7 @@ class Chart:
     ----------
     x, unit : str
         Of the abscissa.
-    panels : tuple of Axes
+    panels : tuple of ChartPanel
     limits : (float, float), optional
         Of the abscissa; what the lines need when None.
     logarithmic : bool
@@ -125,7 +125,7 @@ class Chart:
 
     x: str
     unit: str = ""
-    panels: tuple[Axes, ...]
+    panels: tuple[ChartPanel, ...]
     limits: tuple[float, float] | None = None
     logarithmic: bool = False
     plane: str = ""
@@ -278,7 +278,9 @@ class _Drawing:
             np.asarray(values, dtype=np.float64), self.chart.span, self.chart.logarithmic, _LEFT, self.across
         )
 
-    def _panel(self, panel: Axes, span: tuple[float, float], top: float, high: float, key: str, *, last: bool) -> None:
+    def _panel(
+        self, panel: ChartPanel, span: tuple[float, float], top: float, high: float, key: str, *, last: bool
+    ) -> None:
         chart, right, bottom = self.chart, _LEFT + self.across, top + high
 
         def down(values: ArrayLike) -> Array:
