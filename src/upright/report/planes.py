@@ -76,7 +76,7 @@ def fitted_poles_chart(fitted: Mapping[str, Sequence[Pole]]) -> Chart:
     """Poles of a fitted rig at each equilibrium, with bars for the 95 % intervals of real and imaginary part."""
     lines: list[ChartLine] = []
     for (at, poles), mark, colour in zip(fitted.items(), "xosD^+" * 4, ("q0", "q1", "q2", "q3") * 6, strict=False):
-        values = np.array([complex(p.real.value, p.imag.value) for p in poles])
+        values: Roots = np.array([complex(p.real.value, p.imag.value) for p in poles])
         ends = [np.array([p.real.interval for p in poles]).T, np.array([p.imag.interval for p in poles]).T]
         notes = tuple(
             f"95 % {number(p.real.interval[0], 3)} to {number(p.real.interval[1], 3)} 1/s"
