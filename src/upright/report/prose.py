@@ -119,13 +119,13 @@ def templates_of(package: str) -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     templates: Any = Environment(  # its stubs know only its own filters and tests
-
         loader=PackageLoader(package, "."), undefined=StrictUndefined, finalize=_cell, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
     templates.filters.update({
         "number": number, "percent": percent, "symbol": plain, "typed": typed, "unit": unit, "fmt": format,
         "degrees": math.degrees, "in_percent": in_percent, "parameter": Symbol, "sentence": _sentence,
+        "capital": lambda text: f"{text[:1].upper()}{text[1:]}",
     })  # fmt: skip
     templates.tests.update({"finite": math.isfinite})
     return templates
