@@ -230,7 +230,8 @@ def run_swing_up(
     """
     began = time.perf_counter()
     progress("designing swing-up and catch", 0.0)
-    law = design_swing_up(model, travel=travel)
+    room = stand.travel if travel is None and math.isfinite(stand.travel) else travel
+    law = design_swing_up(model, travel=room, speeds=stand.speeds)
     progress("asking the encoders", 0.3)
     command = probe(model, law)
     log = _coasted(stand, command, folder)
