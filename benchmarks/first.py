@@ -243,11 +243,10 @@ def met(source: Source, dialect: str) -> Contact:
     fit = done["identify"]
     held, design = done.get("design", (None, said))
     assumed = {n for n, v in drafted["parameters"].items() if isinstance(v, dict) and v.get("assumed")}
-    usable = {
-        n: e.value for n, e in fit.estimates.items() if fit.trusted and e.status == "well determined" and not e.rests_on
-    }
-    truth = _meant(source.truth, assumed) if source.plant == contact.plant else {}
-    wrong = tuple(n for n, value in usable.items() if _misses(fit.estimates[n], value, truth.get(n)))
+    known = dict(fit.estimates) | {n: e for a in fit.assumptions for n, e in a.ratios.items()}
+    usable = {n: e.value for n, e in known.items() if fit.trusted and e.status == "well determined" and not e.rests_on}
+    truth = _with_lumped(source.truth) if source.plant == contact.plant else {}
+    wrong = tuple(n for n, value in usable.items() if _misses(known[n], value, truth.get(n)))
     first, last = moving(source)
     windows = [r.get("window", (0.0, math.inf)) for r in drafted["runs"]]
     covered = sum(max(0.0, min(b, last) - max(a, first)) for a, b in windows) / max(last - first, 1e-9)
@@ -259,11 +258,11 @@ def met(source: Source, dialect: str) -> Contact:
     )  # fmt: skip
 
 
-def _meant(truth: dict[str, float], assumed: set[str]) -> dict[str, float]:
-    """With J_p set to 0, l_cg is J_A/(m_p l_cg), the length of the simple pendulum of equal period, and said to be."""
-    if "J_p" not in assumed or not {"l_cg", "m_p", "J_p"} <= truth.keys():
+def _with_lumped(truth: dict[str, float]) -> dict[str, float]:
+    """The true numbers, and the length of the simple pendulum of equal period."""
+    if not {"l_cg", "m_p", "J_p"} <= truth.keys():
         return truth
-    return truth | {"l_cg": truth["l_cg"] + truth["J_p"] / (truth["m_p"] * truth["l_cg"])}
+    return truth | {"J_A/(m_p l_cg)": truth["l_cg"] + truth["J_p"] / (truth["m_p"] * truth["l_cg"])}
 
 
 def _misses(estimate: Any, value: float, truth: float | None) -> bool:

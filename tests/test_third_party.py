@@ -1,4 +1,7 @@
-"""Does somebody else's installed package add a reader, an export target, a rig and a plant, with upright as it is?"""
+"""Does somebody else's installed package add one of each thing, with upright as it is?
+
+A reader, export targets, a driver of rigs, a plant with its drawing, an experiment; commands: `cli/test_elsewhere.py`.
+"""
 
 import textwrap
 
@@ -6,6 +9,7 @@ import numpy as np
 import pytest
 
 import upright as up
+from upright.experiments.laboratory import chosen_experiments
 from upright.physics import find
 from upright.rig.makes import make_rig
 from upright.rigs.rigfile import read_rig_file
@@ -325,3 +329,53 @@ def test_a_plant_that_does_not_load_is_named_and_the_others_are_found(installed)
     assert find("furuta") is up.Furuta
     with pytest.raises(up.BadInput, match="did you mean 'boat'"):
         find("bout")
+
+
+EXPERIMENT = """
+    import numpy as np
+    from upright.experiments.stand.experiment import Experiment
+    from upright.report.page import Chapter
+
+    def tell(at):
+        if FAILS:
+            raise ValueError("never shown")
+        log = at.stand.run([0.0] + [0.2] * 200 + [0.0] * 4000, at.folder, "pushed")
+        return Chapter(title="ITS", verdict="It was pushed.", numbers={"end": float(log["theta_1"][-1])}), True
+
+    FAILS = False
+    EXPERIMENT = Experiment(
+        name="push", order=90, title="A steady push", makes=("torsional",), on=lambda stand: True, tell=tell,
+        seconds=1.0,
+    )
+"""
+
+
+def test_its_experiment_is_made_on_a_twin_and_on_a_driven_rig_and_made_again_when_it_changes(installed, tmp_path):
+    installed("its_course", EXPERIMENT, experiments="push = its_course:EXPERIMENT")
+    out = tmp_path / "out"
+    twin = up.lab(rig="torsional", experiment="push", out=out).numbers["experiments"]["push"]
+    assert (twin["title"], twin["state"]) == ("A steady push", "done")
+    rig = tmp_path / "RIG.toml"
+    rig.write_text('kind = "twin"\nmake = "torsional"\n', encoding="utf-8")
+    driven = up.lab(rig=rig, experiment="push", out=tmp_path / "driven").numbers["experiments"]["push"]
+    one_count = 2 * np.pi / 16000
+    assert driven["numbers"]["end"] == pytest.approx(
+        twin["numbers"]["end"], abs=1.5 * one_count
+    )  # dry friction stops both
+    assert "push" in {e.name for e in chosen_experiments((), "torsional")}  # the whole laboratory has it too
+
+    def state():
+        return up.lab(rig="torsional", experiment="push", out=out).numbers["experiments"]["push"]["state"]
+
+    assert state() == "kept"
+    module = next(tmp_path.rglob("its_course.py"))
+    module.write_text(module.read_text(encoding="utf-8") + "# changed", encoding="utf-8")
+    assert state() == "done"
+
+
+def test_an_experiment_that_does_not_load_is_named_and_the_others_are_made(installed, tmp_path):
+    installed("no_course", "import nowhere_at_all", experiments="push = no_course:EXPERIMENT")
+    with pytest.raises(up.BadInput, match=r"'push' of the package no_course does not load .ModuleNotFoundError"):
+        up.lab(rig="torsional", experiment="push", out=tmp_path / "a")
+    with pytest.warns(UserWarning, match="no_course does not load"):  # the others stay
+        assert [e.name for e in chosen_experiments((), "torsional")] == ["1a", "1b", "3"]

@@ -146,6 +146,10 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'upright' has no attribute {name!r}")
     value = getattr(import_module(f"upright.{_HOME[name]}"), name)
+    if _HOME[name].startswith("verbs."):
+        from upright.verbs.in_python import worded_for_python
+
+        value = worded_for_python(value)
     globals()[name] = value
     return value
 

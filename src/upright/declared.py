@@ -1,4 +1,4 @@
-"""Readers, export targets, drivers of rigs and plants by name: those of this package, and those of installed ones.
+"""Readers, export targets, drivers of rigs, plants and experiments by name: this package's, and installed ones'.
 
 A thing of this package declares itself: it is an object in a module of its kind's room, and nothing else lists it.
 One of somebody else's package is an entry point, ``[project.entry-points."upright.readers"]`` in its pyproject.toml;

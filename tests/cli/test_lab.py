@@ -8,6 +8,7 @@ import signal
 import pytest
 from typer.testing import CliRunner
 
+from tests.experiments.rigs import declared
 from upright.cli import app
 from upright.experiments import laboratory
 from upright.experiments.laboratory import EXPERIMENTS, Experiment
@@ -73,17 +74,17 @@ def test_wrong_calls_are_answered_in_a_sentence(tmp_path, arguments, says):
 
 def test_whatever_is_asked_comes_after_what_it_stands_on():
     for make in ("", "linear", "furuta", "rectilinear", "torsional"):
-        for e in EXPERIMENTS:
+        for e in EXPERIMENTS.values():
             if not e.makes or (make and make not in e.makes):  # of a rig of one's own alone
                 continue
-            for name in (e.key, e.part_of):
-                order = [x.key for x in laboratory.chosen_experiments([name], make)]
-                assert e.key in order
-                there = {x.key: x for x in EXPERIMENTS}
+            for name in {e.name, e.part_of or e.name}:
+                order = [x.name for x in laboratory.chosen_experiments([name], make)]
+                assert e.name in order
+                there = EXPERIMENTS
                 on = make or e.makes[0]
                 for need in e.needs:
                     if on in there[need].makes and on == (make or there[need].makes[0]):
-                        assert order.index(need) < order.index(e.key)
+                        assert order.index(need) < order.index(e.name)
 
 
 def stopped_by(swallow):
@@ -102,7 +103,7 @@ def stopped_by(swallow):
         return told("2"), True
 
     def one(key, tell):
-        return Experiment(key=key, part_of=key, title=f"Number {key}", makes=("furuta",), needs=(), live_needs=(),
+        return Experiment(name=key, title=f"Number {key}", makes=("furuta",), needs=(), live_needs=(),
                           on=lambda _: False, seconds=1, tell=tell)  # fmt: skip
 
     return (one("1", lambda task: (told("1"), True)), one("2", press), one("3", lambda task: (told("3"), True)))
@@ -110,7 +111,7 @@ def stopped_by(swallow):
 
 @pytest.mark.parametrize("swallow", [False, True])
 def test_ctrl_c_keeps_and_reports_what_is_there(tmp_path, monkeypatch, swallow):
-    monkeypatch.setattr(laboratory, "EXPERIMENTS", stopped_by(swallow))
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", declared(*stopped_by(swallow)))
     before = signal.getsignal(signal.SIGINT)
     outcome = upright("lab", "-o", tmp_path)
     assert outcome.exit_code == 130
@@ -127,7 +128,7 @@ def test_ctrl_c_keeps_and_reports_what_is_there(tmp_path, monkeypatch, swallow):
 
 
 def test_without_the_pdf_extra_a_sentence_says_how_to_get_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(laboratory, "EXPERIMENTS", stopped_by(swallow=False)[:1])
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", declared(*stopped_by(swallow=False)[:1]))
     assert "report.pdf" in upright("lab", "-o", tmp_path).stdout
     monkeypatch.setattr("upright.report.pdf.find_spec", lambda name: None)
     outcome = upright("lab", "-o", tmp_path / "other")
@@ -148,8 +149,8 @@ def test_it_ends_with_the_report_and_what_to_try_next(spoken):
     assert outcome.exit_code == 0, outcome.output
     assert (folder / "report.html").stat().st_size < 5_000_000  # can be mailed
     assert re.search(r"Report: .*report\.html", outcome.stdout)
-    for e in EXPERIMENTS:
-        assert (f"Experiment {e.key}, {e.title}" in outcome.stdout) == bool(e.makes)
+    for e in EXPERIMENTS.values():
+        assert (f"Experiment {e.name}, {e.title}" in outcome.stdout) == bool(e.makes)
     for command in ("upright lab --seed 1", "upright lab --rig linear", "upright init"):
         assert command in outcome.stdout
 

@@ -6,6 +6,7 @@ The expected numbers are those of what was put in, or are read off the log itsel
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -51,6 +52,41 @@ def test_a_wrong_sign_or_scale_is_undone(plant, fault):
     table = "drive" if doctored.channel == "u" else f"sensors.{doctored.channel}"
     cure = "sign = -1" if fault == "sign" else "scale = "
     assert finding.key.startswith(f"[{table}]\n{cure}")
+
+
+SIGNED = {"dead": "value [1]", "jump": "jump [", "effort": "value [1]", "spike": "largest"}
+"""Evidence that turns with the columns."""
+LATER = 1024.0
+IN_CLOCK = ("from [s]", "end [s]", "logged end [s]")
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_findings_do_not_depend_on_when_the_clock_began(plant, fault):
+    doctored, before = planted(plant, fault)
+    record = replace(doctored.record, t=doctored.record.t + LATER)
+    after = examine(record, doctored.rig, doctored.wiring).wrong
+    for here, later in zip(before, after, strict=True):
+        assert (later.kind, later.columns, later.severity) == (here.kind, here.columns, here.severity)
+        shift = {n: LATER * (n in IN_CLOCK) for n in here.evidence}
+        assert later.evidence == pytest.approx({n: v + shift[n] for n, v in here.evidence.items()}, rel=1e-6, abs=1e-9)
+        assert later.marks == pytest.approx([t + LATER for t in here.marks])
+        assert np.ravel(later.spans) == pytest.approx(np.ravel(here.spans) + LATER)
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_findings_are_those_of_the_rig_in_a_mirror(plant, fault):
+    """Equations of both rigs are odd, so a log with every sign turned is one of the same rig with the same fault."""
+    doctored, before = planted(plant, fault)
+    record = replace(doctored.record, signals={n: -x for n, x in doctored.record.signals.items()})
+    sensors = {n: replace(s, offset=-float(s.offset)) for n, s in doctored.wiring.sensors.items()}
+    after = examine(record, doctored.rig, replace(doctored.wiring, sensors=sensors)).wrong
+    for here, mirrored in zip(before, after, strict=True):
+        assert (mirrored.kind, mirrored.columns, mirrored.severity) == (here.kind, here.columns, here.severity)
+        turned = {n: -v if n.startswith(SIGNED.get(here.kind, "-")) else v for n, v in here.evidence.items()}
+        assert mirrored.evidence == pytest.approx(turned, rel=1e-6, abs=1e-9)
+        assert mirrored.spans == here.spans
 
 
 @pytest.mark.parametrize("plant", RIGS)

@@ -1,8 +1,17 @@
-"""Rigs of RIG.toml: a twin of a make, and one that only its owner's study tells of."""
+"""Rigs of RIG.toml: a twin of a make, and one that only its owner's study tells of; experiments of a laboratory."""
 
 from __future__ import annotations
 
+from upright.declared import Declared
+from upright.experiments.stand.experiment import Experiment
 from upright.experiments.stand.live import live_stand
+
+
+def declared(*experiments: Experiment) -> Declared[Experiment]:
+    """A laboratory's experiments: these, and no package's."""
+    own = {e.name: e for e in experiments}
+    return Declared("experiment", "upright.none", lambda: own, lambda value: isinstance(value, Experiment))
+
 
 OWN = """
 [rig]

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.experiments.rigs import declared
 from upright.errors import NotIdentifiable
 from upright.experiments import laboratory
-from upright.experiments.table import Experiment
+from upright.experiments.stand.experiment import Experiment
 from upright.report.page import Chapter, KeyNumber, Part
 from upright.workers import Workers
 
@@ -31,17 +32,17 @@ def bench(monkeypatch):
 
         makes = ("furuta", "linear") if key != "3" else ("rectilinear",)
         return Experiment(
-            key=key, part_of=key[0], title=f"Small {key}", makes=makes, on=lambda _: False, needs=needs, live_needs=(),
+            name=key, part_of=key[0], title=f"Small {key}", makes=makes, on=lambda _: False, needs=needs, live_needs=(),
             seconds=1, tell=tell,
         )  # fmt: skip
 
     all_of_them = (small("1"), small("2", ("1",)), small("3", ("1",)))
-    monkeypatch.setattr(laboratory, "EXPERIMENTS", all_of_them)
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", declared(*all_of_them))
     return ran, trouble
 
 
 def verdicts(session):
-    return {t.experiment.key: t.chapter.verdict for t in session.results}
+    return {t.experiment.name: t.chapter.verdict for t in session.results}
 
 
 def test_numbers_go_from_one_experiment_to_those_on_the_same_rig(bench, tmp_path):
@@ -55,8 +56,8 @@ def test_interrupted_it_keeps_what_is_finished_and_goes_on_from_there(bench, tmp
     trouble["2"] = KeyboardInterrupt()
     first = laboratory.run_laboratory((), "", 0, tmp_path)
     assert first.interrupted
-    assert [t.experiment.key for t in first.results] == ["1"]
-    assert [e.key for e in first.missing] == ["2", "3"]
+    assert [t.experiment.name for t in first.results] == ["1"]
+    assert [e.name for e in first.missing] == ["2", "3"]
     told = laboratory.book(first, laboratory.date(2006, 6, 18))
     assert "Stopped by Ctrl-C" in told.notes[0]
     assert any("Go on" in s.sentence for s in told.steps)
@@ -99,12 +100,12 @@ def test_one_experiment_again_does_not_cost_the_others_their_place(bench, tmp_pa
     ran, trouble = bench
     laboratory.run_laboratory((), "", 0, tmp_path)
     again = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
-    assert [(t.experiment.key, t.state) for t in again.results] == [("1", "done"), ("2", "done"), ("3", "kept")]
+    assert [(t.experiment.name, t.state) for t in again.results] == [("1", "done"), ("2", "done"), ("3", "kept")]
     assert laboratory.typed_again(again) == "upright lab"
     trouble["2"] = KeyboardInterrupt()
     stopped = laboratory.run_laboratory(("2",), "", 0, tmp_path, fresh=True)
     assert stopped.interrupted
-    assert [t.experiment.key for t in stopped.results] == ["1", "2", "3"]  # 2 as it was kept: it still holds
+    assert [t.experiment.name for t in stopped.results] == ["1", "2", "3"]  # 2 as it was kept: it still holds
     alone = laboratory.run_laboratory(("1",), "", 1, tmp_path)
     assert laboratory.typed_again(alone) == "upright lab --experiment 1 --seed 1"
     assert laboratory.typed_again(alone, 7) == "upright lab --experiment 1 --seed 7"  # the same on another rig
@@ -139,7 +140,7 @@ def test_experiments_side_by_side_say_what_they_say_one_after_another(tmp_path):
     """Frequency response and free swing both stand on the weighing, neither on the other."""
     one = laboratory.run_laboratory(("1", "4"), "furuta", 0, tmp_path / "one")
     two = laboratory.run_laboratory(("1", "4"), "furuta", 0, tmp_path / "two", workers=Workers(number=2))
-    assert [t.experiment.key for t in two.results] == ["1a", "1b", "4"]
+    assert [t.experiment.name for t in two.results] == ["1a", "1b", "4"]
     assert [t.state for t in two.results] == ["done"] * 3
     assert verdicts(two) == verdicts(one)
     for key in ("1b", "4"):
@@ -165,6 +166,7 @@ def test_the_cover_names_each_rig_once_with_the_seed_that_makes_it_again(bench, 
     facts = dict(cover.facts)
     assert facts["Rig"] == "ECP 205 + A51, Furuta pendulum (seed 4); ECP 210, two carts (seed 4)"
     assert facts["Data"] == laboratory.TWINS
+    assert cover.first_line.startswith("SIMULATED")
     assert facts["Experiments"] == "1, 2, 3"
     assert facts["Made"].startswith("2006-06-18, upright ")
     assert facts["Again"] == "upright lab --seed 4"

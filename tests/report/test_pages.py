@@ -206,14 +206,15 @@ def test_what_a_person_wrote_is_never_taken_for_markup(page, tmp_path):
 def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
     from upright.experiments.laboratory import EXPERIMENTS, ExperimentResult, Session, book, date
 
+    there = tuple(EXPERIMENTS.own.values())
     pypdf = pytest.importorskip("pypdf")
     found = (KeyNumber(what="stiffness [N/m]", value="412.5", interval="409.1 to 415.9", truth="411.2"),)
-    made = [replace(page(tmp_path), key=e.key, findings=found)
-            for page, e in zip((short_ladder_page, measured_response_page), EXPERIMENTS, strict=False)]  # fmt: skip
-    session = Session(make="", seed=7, folder=tmp_path, requested=EXPERIMENTS[:3], interrupted=True)
+    made = [replace(page(tmp_path), key=e.name, findings=found)
+            for page, e in zip((short_ladder_page, measured_response_page), there, strict=False)]  # fmt: skip
+    session = Session(make="", seed=7, folder=tmp_path, requested=there[:3], interrupted=True)
     session.results.extend(
         ExperimentResult(experiment=e, make="furuta", rig="Furuta pendulum", chapter=c, state="done", seconds=1.0)
-        for e, c in zip(EXPERIMENTS, made, strict=False)
+        for e, c in zip(there, made, strict=False)
     )
     told = book(session, date(2006, 6, 18))
     page = Page(html_page(told))
@@ -221,7 +222,7 @@ def test_the_laboratory_tells_every_chapter_on_all_three(tmp_path):
     print_book(Console(file=lines, width=300, highlight=False), told, [tmp_path / "report.html"])
     paper = "".join(p.extract_text() for p in pypdf.PdfReader(write_pdf(tmp_path / "book.pdf", told)).pages)
     for said in (squeezed(page.prose), squeezed(lines.getvalue()), squeezed(paper)):
-        for needed in ("412.5", "409.1 to 415.9", "411.2", EXPERIMENTS[2].title, "Stopped by Ctrl-C"):
+        for needed in ("412.5", "409.1 to 415.9", "411.2", there[2].title, "Stopped by Ctrl-C"):
             assert squeezed(needed) in said
         assert all(squeezed(c.verdict) in said for c in made)
     assert len(set(page.ids)) == len(page.ids)

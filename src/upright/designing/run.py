@@ -352,9 +352,7 @@ def _from_encoders(
     rig: Rig, model: StateSpace, sampled: StateSpace, request: DesignRequest
 ) -> tuple[str, dict[str, Estimator], tuple[float, ...]]:
     """The requested velocity estimator, all that a rig has, and the steps of its encoders."""
-    resolution = request.resolution or tuple(
-        completed(rig, needs=("counts",), who="upright design").resolution.tolist()
-    )
+    resolution = request.resolution or tuple(completed(rig, needs=("counts",), who="design").resolution.tolist())
     if request.limit is None and request.speed == "kalman":
         raise BadInput(
             "a Kalman filter has to know how hard the rig is pushed, a tenth of what the drive can; give the largest "

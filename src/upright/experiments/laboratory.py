@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import platform
 import time
@@ -16,13 +17,15 @@ from typing import Any
 import numpy as np
 
 from upright._version import __version__
+from upright.basis import SIMULATED
 from upright.errors import BadInput, UprightError
 from upright.experiments.nonideal import nonideal as nonideal_twin
 from upright.experiments.parallel import run_parallel
+from upright.experiments.stand.experiment import Experiment, ExperimentInput
 from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import TestStand
 from upright.experiments.stand.twin import TwinStand
-from upright.experiments.table import EXPERIMENTS, QUICK, Experiment, ExperimentInput
+from upright.experiments.table import EXPERIMENTS
 from upright.files import read_text, write_json
 from upright.progress import Progress, silent
 from upright.report.page import PAPER, Book, Chapter, Step, as_plain, from_plain
@@ -91,7 +94,7 @@ class Session:
     @property
     def missing(self) -> tuple[Experiment, ...]:
         """What was requested and not begun."""
-        return tuple(e for e in self.requested if e.key not in {t.experiment.key for t in self.results})
+        return tuple(e for e in self.requested if e.name not in {t.experiment.name for t in self.results})
 
 
 def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | None = None) -> tuple[Experiment, ...]:
@@ -102,6 +105,9 @@ def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | No
     BadInput
         When there is no such experiment, or not on this rig.
     """
+    for name in requested:
+        if name in EXPERIMENTS:
+            EXPERIMENTS.named(name)  # refuses one of another package that does not load
     there = _there(make, live)
     if live is not None and not there:
         raise BadInput(
@@ -110,12 +116,13 @@ def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | No
         )
     wanted: set[str] = set()
     for name in requested:
-        named = [e for e in EXPERIMENTS if name in (e.key, e.part_of)]
+        known = EXPERIMENTS.sound().values()
+        named = [e for e in known if name in (e.name, e.part_of)]
         if not named:
-            valid = dict.fromkeys(n for e in EXPERIMENTS for n in (e.part_of, e.key))
+            valid = dict.fromkeys(n for e in known for n in (e.part_of, e.name) if n)
             raise BadInput(f"there is no experiment '{name}'; take one of {', '.join(sorted(valid))}.")
         if not any(e in there for e in named):
-            has = f"has experiments {', '.join(e.key for e in there)}"
+            has = f"has experiments {', '.join(e.name for e in there)}"
             if live is not None:
                 raise BadInput(
                     f"experiment {name} cannot be made on {make}, which {has}; "
@@ -123,27 +130,27 @@ def chosen_experiments(requested: Sequence[str], make: str, live: LiveStand | No
                 )
             wanted_rig = " or ".join(named[0].makes) or "RIG.toml, a rig of your own"
             raise BadInput(f"experiment {name} is for --rig {wanted_rig}; {make or 'a simulated one'} {has}.")
-        wanted |= {e.key for e in named if e in there}
+        wanted |= {e.name for e in named if e in there}
     if not requested:
-        wanted = {e.key for e in there if e.key != QUICK}
+        wanted = {e.name for e in there if not e.alone}
     for e in reversed(there):  # who builds on another comes after it
-        if e.key in wanted:
+        if e.name in wanted:
             wanted |= set(_needs(e, make, live))
-    return tuple(e for e in there if e.key in wanted)
+    return tuple(e for e in there if e.name in wanted)
 
 
 def _there(make: str, live: LiveStand | None) -> list[Experiment]:
     """Experiments that a rig can have; all for the paper's."""
     if live is not None:
-        return [e for e in EXPERIMENTS if e.on(live)]
-    return [e for e in EXPERIMENTS if make in e.makes or (not make and e.makes)]
+        return [e for e in EXPERIMENTS.sound().values() if e.on(live)]
+    return [e for e in EXPERIMENTS.sound().values() if make in e.makes or (not make and e.makes)]
 
 
 def _needs(e: Experiment, make: str, live: LiveStand | None) -> list[str]:
     """What it takes numbers from: earlier experiments on the same rig."""
     if live is not None:
-        return [n.key for n in _there(make, live) if n.key in e.live_needs]
-    return [n.key for n in _there(make, live) if n.key in e.needs and n.make(make) == e.make(make)]
+        return [n.name for n in _there(make, live) if n.name in e.live_needs]
+    return [n.name for n in _there(make, live) if n.name in e.needs and n.make(make) == e.make(make)]
 
 
 def run_laboratory(
@@ -206,10 +213,10 @@ def run_laboratory(
     for e in session.requested if workers.alone else ():
 
         def tell(step: str, share: float, e: Experiment = e, behind: float = behind) -> None:
-            progress(f"experiment {e.key}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
+            progress(f"experiment {e.name}: {step}", (behind + e.seconds * min(share, 1.0)) / whole)
 
         try:
-            session.results.append(_one(session, e, digests[e.key], tell, stopped, fresh))
+            session.results.append(_one(session, e, digests[e.name], tell, stopped, fresh))
             session.interrupted = session.results[-1].state == "stopped"
         except KeyboardInterrupt:
             session.interrupted = True
@@ -225,7 +232,7 @@ def _run_parallel(
     session: Session, digests: Mapping[str, str], workers: Workers, progress: Progress, stopped: Callable[[], bool],
     fresh: bool,
 ) -> None:  # fmt: skip
-    requested = {e.key: e for e in session.requested}
+    requested = {e.name: e for e in session.requested}
     needs = {key: session.needs(e) for key, e in requested.items()}
     run = partial(_apart, replace(session, requested=()), digests, stopped, fresh)
     contents, interrupted = run_parallel({k: e.seconds for k, e in requested.items()}, needs, run, workers, progress)
@@ -239,14 +246,14 @@ def _apart(
 ) -> dict[str, Any]:  # fmt: skip
     """One experiment in another process: an `ExperimentResult` as plain values, its pictures drawn."""
     results = [_brought(k, content) for k, content in earlier.items()]
-    e = next(e for e in EXPERIMENTS if e.key == key)
+    e = EXPERIMENTS[key]
     result = _one(replace(session, results=results), e, digests[key], progress, stopped, fresh)
     return {**vars(result), "experiment": key, "chapter": as_plain(result.chapter)}
 
 
 def _brought(key: str, content: Mapping[str, Any]) -> ExperimentResult:
     """The result that came from there."""
-    e = next(e for e in EXPERIMENTS if e.key == key)
+    e = EXPERIMENTS[key]
     values: dict[str, Any] = {**content, "experiment": e, "chapter": from_plain(content["chapter"])}
     return ExperimentResult(**values)
 
@@ -260,13 +267,14 @@ def _digests(session: Session) -> dict[str, str]:
     for e in session.there:
         parts = (
             _program() if session.live is None else session.live.text,
-            e.key,
+            "" if e.name in EXPERIMENTS.own else read_text(Path(inspect.getfile(e.tell))),
+            e.name,
             session.make_for(e),
             str(session.seed),
             "nonideal" if session.nonideal else "",
             *(digests[n] for n in session.needs(e)),
         )
-        digests[e.key] = sha256("\n".join(parts).encode()).hexdigest()
+        digests[e.name] = sha256("\n".join(parts).encode()).hexdigest()
     return digests
 
 
@@ -300,18 +308,18 @@ def _stored(folder: Path, digest: str) -> Chapter | None:
 
 def _with_stored(session: Session, digests: Mapping[str, str]) -> list[ExperimentResult]:
     """The results, and what else is stored of an earlier run on the same rig."""
-    results = {t.experiment.key: t for t in session.results}
+    results = {t.experiment.name: t for t in session.results}
     for e in session.there:
         stored = (
-            None if e.key in results else _stored(session.folder / e.key, _with_measured(session, e, digests[e.key]))
+            None if e.name in results else _stored(session.folder / e.name, _with_measured(session, e, digests[e.name]))
         )
         if stored:
             make = session.make_for(e)
             name = session.stand(make).rig.name
-            results[e.key] = ExperimentResult(
+            results[e.name] = ExperimentResult(
                 experiment=e, make=make, rig=name, chapter=stored, state="kept", seconds=0.0
             )
-    return [results[e.key] for e in session.there if e.key in results]
+    return [results[e.name] for e in session.there if e.name in results]
 
 
 def _one(
@@ -320,7 +328,7 @@ def _one(
     """One experiment, from an earlier run where that still holds."""
     began = time.perf_counter()
     make, needs = session.make_for(e), session.needs(e)
-    stand, folder = session.stand(make), session.folder / e.key
+    stand, folder = session.stand(make), session.folder / e.name
     digest = _with_measured(session, e, digest)
     folder.mkdir(parents=True, exist_ok=True)
     progress("starting", 0.0)
@@ -329,15 +337,15 @@ def _one(
         at = ExperimentInput(
             stand=stand, seed=session.seed, folder=folder, progress=progress, stopped=stopped,
             earlier={
-                t.experiment.key: t.chapter
+                t.experiment.name: t.chapter
                 for t in session.results
-                if t.experiment.key in needs and t.state in ("done", "kept")
+                if t.experiment.name in needs and t.state in ("done", "kept")
             },
             folders={n: session.folder / n for n in needs},
         )  # fmt: skip
         try:
             chapter, whole = e.tell(at)
-            chapter = replace(chapter, key=e.key, title=e.title)
+            chapter = replace(chapter, key=e.name, title=e.title)
             state = "done" if whole and not stopped() else "stopped"
         except UprightError as error:
             state, chapter = "failed", _failed(e, str(error))
@@ -351,7 +359,7 @@ def _one(
 
 
 def _failed(e: Experiment, why: str) -> Chapter:
-    return Chapter(key=e.key, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)
+    return Chapter(key=e.name, title=e.title, verdict="This experiment could not be finished.", detail=why, sound=False)
 
 
 NONIDEAL = (
@@ -369,7 +377,7 @@ def book(session: Session, day: date) -> Book:
     rigs = dict.fromkeys(f"{t.rig}{seeded}" for t in session.results)
     notes: list[str] = []
     if session.interrupted:
-        left = ", ".join(e.key for e in session.missing)
+        left = ", ".join(e.name for e in session.missing)
         notes.append(
             "Stopped by Ctrl-C; this report holds what was there by then"
             + (f", and not yet experiments {left}." if left else ".")
@@ -379,15 +387,15 @@ def book(session: Session, day: date) -> Book:
         facts=(
             ("Rig", "; ".join(rigs) or (session.make if live is not None else f"seed {session.seed}")),
             ("Data", live.source if live is not None else TWINS + (f" {NONIDEAL}" if session.nonideal else "")),
-            ("Experiments", ", ".join(t.experiment.key for t in session.results) or "none"),
+            ("Experiments", ", ".join(t.experiment.name for t in session.results) or "none"),
             ("Made", f"{day.isoformat()}, upright {__version__}, Python {platform.python_version()}"),
             ("Again", typed_again(session)),
         ),
         chapters=tuple(
             replace(t.chapter, about=t.rig, finished=t.state in ("done", "kept")) for t in session.results
         ),
-        notes=tuple(notes),
-        missing=tuple((e.key, e.title) for e in session.missing),
+        first_line=SIMULATED if live is None else live.performed, notes=tuple(notes),
+        missing=tuple((e.name, e.title) for e in session.missing),
         steps=next_steps(session), sources=(PAPER,),
     )  # fmt: skip
 
@@ -398,12 +406,10 @@ def typed_again(session: Session, seed: int | None = None) -> str:
     shown = ["upright lab"]
     if session.make:
         shown.append(f"--rig {session.make}")
-    there = [e for e in session.there if e.key != QUICK]
-    keys = {e.key for e in session.requested} | {t.experiment.key for t in session.results}
-    if QUICK in keys:
-        shown.append("--quick")
-    elif len(keys) < len(there):
-        shown += [f"--experiment {e.key}" for e in there if e.key in keys]
+    whole = {e.name for e in session.there if not e.alone}
+    made = {e.name for e in session.requested} | {t.experiment.name for t in session.results}
+    if made != whole:
+        shown += [f"--experiment {e.name}" for e in session.there if e.name in made]
     if seed:
         shown.append(f"--seed {seed}")
     if session.nonideal:
@@ -420,7 +426,7 @@ def next_steps(session: Session) -> tuple[Step, ...]:
                  f"{typed_again(session)} -o {typed(session.folder)}")
         )  # fmt: skip
     if session.live is not None:
-        held = next((t.chapter.numbers for t in session.results if t.experiment.key == "2"), {})
+        held = next((t.chapter.numbers for t in session.results if t.experiment.name == "2"), {})
         if "recommended" in held:
             rig, stem = session.folder / "2" / "rig.toml", held["recommended"].replace(" ", "_")
             law = rig.with_name(f"law_regulation_{stem}.json")
@@ -444,10 +450,10 @@ def session_summary(session: Session, report: Path, pdf: Path | None) -> dict[st
         "report": str(report),
         "pdf": str(pdf) if pdf else None,
         "interrupted": session.interrupted,
-        "missing": [e.key for e in session.missing],
+        "missing": [e.name for e in session.missing],
         "seconds": session.seconds,
         "experiments": {
-            t.experiment.key: {
+            t.experiment.name: {
                 "title": t.chapter.title,
                 "rig": t.rig,
                 "make": t.make,

@@ -330,6 +330,8 @@ class Book:
     facts : tuple of (str, str)
         For the cover: what was run, on which rig, when, by which program.
     chapters : tuple of Chapter
+    first_line : str
+        What stands before everything else: that no rig was driven.
     notes : tuple of str
         What a reader must know first, such as an interruption.
     missing : tuple of (str, str)
@@ -341,6 +343,7 @@ class Book:
     title: str
     facts: tuple[tuple[str, str], ...]
     chapters: tuple[Chapter, ...]
+    first_line: str = ""
     notes: tuple[str, ...] = ()
     missing: tuple[tuple[str, str], ...] = ()
     steps: tuple[Step, ...] = ()

@@ -185,7 +185,7 @@ def lab(
         numbers=laboratory.session_summary(session, report, pdf), finished=not session.interrupted,
     )  # fmt: skip
     took = {
-        t.experiment.key: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
+        t.experiment.name: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
         for t in session.results
     }
     hints = ["Each chapter of the report ends with the commands that repeat its steps."]

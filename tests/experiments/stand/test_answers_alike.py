@@ -94,4 +94,15 @@ def test_both_rest_where_the_encoders_are_zeroed_and_know_their_numbers(stands):
     assert simulated.truth == driven.truth
     assert simulated.make is driven.make
     assert simulated.performed == driven.performed == SIMULATED
-    assert (simulated.simulated, driven.simulated) == (True, False)
+
+
+def test_a_simulation_waits_for_nobody_and_nothing_breaks_in_it_and_a_driven_rig_is_no_such_thing(stands):
+    """What a twin behind the protocol truly is stays closed to experiments: it is run as hardware is."""
+    simulated, driven = stands
+    assert simulated.starts_anywhere
+    assert simulated.may_fall
+    assert not simulated.attended
+    assert driven.attended
+    assert not driven.starts_anywhere
+    assert not driven.may_fall
+    assert (simulated.exact, driven.exact) == (simulated.rig, None)

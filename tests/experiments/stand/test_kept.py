@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.experiments.rigs import declared
 from upright.experiments import laboratory
+from upright.experiments.stand.experiment import Experiment, ExperimentInput
 from upright.experiments.stand.live import live_stand
-from upright.experiments.table import Experiment, ExperimentInput
 from upright.report.page import Chapter
 
 
@@ -27,11 +28,11 @@ def bench(tmp_path, monkeypatch):
 
     def experiment(key: str, needs: tuple[str, ...]) -> Experiment:
         return Experiment(
-            key=key, part_of=key, title=key, makes=("furuta",), on=lambda _: True, needs=(), live_needs=needs,
+            name=key, title=key, makes=("furuta",), on=lambda _: True, needs=(), live_needs=needs,
             seconds=1.0, tell=tell,
         )  # fmt: skip
 
-    monkeypatch.setattr(laboratory, "EXPERIMENTS", (experiment("1b", ()), experiment("2", ("1b",))))
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", declared(experiment("1b", ()), experiment("2", ("1b",))))
 
     def run(folder: Path = tmp_path / "out") -> list[str]:
         made.clear()

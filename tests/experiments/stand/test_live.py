@@ -72,7 +72,7 @@ def test_whose_rig_it_is_may_be_said_by_either_file(own, tmp_path):
 
 
 def test_a_fit_alone_is_not_identified_again(own, tmp_path):
-    assert [e.key for e in chosen_experiments((), "RIG.toml", own)] == ["1b", "2", "2b", "4"]
+    assert [e.name for e in chosen_experiments((), "RIG.toml", own)] == ["1b", "2", "2b", "4"]
     counts = {"value": 2048.0, "unit": "1/rev", "source": "known"}
     said = {
         "servo_period": {"value": 2e-3, "unit": "s", "source": "known"},
@@ -81,7 +81,7 @@ def test_a_fit_alone_is_not_identified_again(own, tmp_path):
     }
     fit_file(tmp_path, own.rig.plant, name="furuta", **said)
     alone = made(tmp_path, 'kind = "twin"\nfit = "fit.json"\n')
-    assert [e.key for e in chosen_experiments((), "RIG.toml", alone)] == ["2", "2b"]
+    assert [e.name for e in chosen_experiments((), "RIG.toml", alone)] == ["2", "2b"]
 
 
 def test_a_run_that_the_supervisor_ends_was_lost_there(tmp_path):

@@ -101,8 +101,8 @@ def test_pieces_add_up_and_err_by_their_tolerance(tmp_path):
 
 
 def test_a_rig_is_weighed_where_its_file_names_what_is_bolted_on(tmp_path):
-    assert [e.key for e in chosen_experiments((), "RIG.toml", made(tmp_path))] == ["1a", "1b"]
-    assert [e.key for e in chosen_experiments((), "RIG.toml", made(tmp_path, ""))] == ["1b"]
+    assert [e.name for e in chosen_experiments((), "RIG.toml", made(tmp_path))] == ["1a", "1b"]
+    assert [e.name for e in chosen_experiments((), "RIG.toml", made(tmp_path, ""))] == ["1b"]
     with pytest.raises(BadInput, match=r"1a cannot be made on .*, which has experiments 1b;"):
         up.lab(rig=str(tmp_path / "RIG.toml"), experiment="1a", out=tmp_path / "out")
 

@@ -176,16 +176,21 @@ def test_what_an_assumed_zero_moves_rests_on_it():
     for name in ("b_2", "b_2c"):
         ratio = simple[name].value / whole[name].value
         assert abs(ratio - equal / SWING["l_cg"]) < 0.02 * ratio
-        assert simple[name].rests_on == ("J_p",)
-    assert abs(simple["l_cg"].value - equal) < 1e-3 * equal
-    assert usable(fits[0]) == {"l_cg"}  # as the length of the simple pendulum of equal period, which it says
+    assert {name for name, e in simple.items() if e.rests_on == ("J_p",)} == {"l_cg", "b_2", "b_2c"}
+    low, high = simple["l_cg"].interval
+    assert low < SWING["l_cg"] < high  # the centre of gravity, which this fit did not see
+    (known,) = fits[0].assumptions[0].ratios.items()
+    assert known[0] == "J_A/(m_p l_cg)"
+    assert known[1].interval[0] < equal < known[1].interval[1]
+    assert known[1].status == "well determined"
+    assert not usable(fits[0])
     assert "equivalent point pendulum" in fits[0].verdict
 
 
 def test_the_verdict_names_the_measurement_that_frees_a_number():
     asked = {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}
     light = identify(hanging({"m_p": 1.0}, {"J_p": 0.0}, asked), [swing()])
-    assert usable(light) == {"l_cg"}
+    assert usable(light) == {"l_cg"}  # J_p is known to be 0, so it is the length of a simple pendulum
     assert "b_2, b_2c rest on m_p (assumed)." in light.verdict
     assert 'Measure m_p and give it as known, m_p = "... kg" under [parameters].' in light.verdict
     weighed = identify(hanging({}, {"J_p": SWING["J_p"], "m_p": SWING["m_p"]}, asked), [swing()])

@@ -246,8 +246,10 @@ def test_a_term_left_out_widens_the_others_to_what_they_are_with_it() -> None:
         assert np.allclose(told[u.name], expected, atol=0.1 * q * whole.sigma[place]), u.name
 
 
-def assumed(name: str, value: float, unit: str, redefines: tuple[str, ...] = (), **follows: float) -> Assumption:
-    return Assumption(name=name, value=value, unit=unit, follows=follows, without={}, redefines=redefines)
+def assumed(name: str, value: float, unit: str, known: tuple[str, ...] = (), **follows: float) -> Assumption:
+    firm = Estimate(value=1.0, stderr=0.1, interval=(0.8, 1.2))
+    ratios = dict.fromkeys(known, firm)
+    return Assumption(name=name, value=value, unit=unit, follows=follows, without={}, ratios=ratios)
 
 
 @pytest.mark.parametrize(
@@ -265,9 +267,9 @@ def assumed(name: str, value: float, unit: str, redefines: tuple[str, ...] = (),
             "[parameters].",
         ),
         (
-            assumed("J_p", 0.0, "kg m^2", ("l_cg",), l_cg=1.3, b=0.4, w=0.0),
-            "J_p = 0 kg m^2 is assumed, not known; b would move with it; l_cg takes what it would explain into its own "
-            'value; w does not depend on it. Measure J_p and give it as known, J_p = "... kg m^2" under [parameters].',
+            assumed("J_p", 0.0, "kg m^2", ("J_A/(m_p l_cg)",), l_cg=1.3, b=0.4, w=0.0),
+            "J_p = 0 kg m^2 is assumed, not known; l_cg, b would move with it; J_A/(m_p l_cg) does not; "
+            'w does not depend on it. Measure J_p and give it as known, J_p = "... kg m^2" under [parameters].',
         ),
         (assumed("g", 9.81, "", w=0.01), "g = 9.81 is assumed, not known; w does not depend on it."),
         (
@@ -287,10 +289,10 @@ def test_an_estimate_names_every_assumed_number_that_it_rests_on() -> None:
     found = [
         assumed("a", 1.0, "", m=1.0, k=0.0),
         assumed("b", 1.0, "", m=0.5, k=0.03),
-        assumed("c", 0.0, "", ("m",), m=2.0),
+        assumed("c", 0.0, "", m=2.0),
     ]
     told = with_assumptions({"m": e, "k": e, "other": e}, found)
-    assert {n: x.rests_on for n, x in told.items()} == {"m": ("a", "b"), "k": ("b",), "other": ()}
+    assert {n: x.rests_on for n, x in told.items()} == {"m": ("a", "b", "c"), "k": ("b",), "other": ()}
 
 
 @pytest.mark.parametrize(("quanta", "per"), [((0.0,), 1.0), ((1e-4,), 1e-4), ((1e-4, 2e-4), 1.0)])

@@ -172,8 +172,8 @@ def test_friction_at_zero_is_said_to_have_no_evidence() -> None:
 @pytest.mark.parametrize(
     ("friction", "headline"),
     [
-        (1.0, "Known per assumed number: J_p/gain = 0.002 (0.0019 to 0.0021) kg m^2; b_2/gain = 0.002"),
-        (0.5, "Known per assumed number: J_p/gain = 0.002 (0.0019 to 0.0021) kg m^2."),
+        (1.0, "Known all the same: J_p/gain = 0.002 (0.0019 to 0.0021) kg m^2; b_2/gain = 0.002"),
+        (0.5, "Known all the same: J_p/gain = 0.002 (0.0019 to 0.0021) kg m^2."),
     ],
 )
 def test_numbers_that_all_scale_with_an_assumed_gain_are_known_as_ratios(friction: float, headline: str) -> None:
@@ -185,7 +185,7 @@ def test_numbers_that_all_scale_with_an_assumed_gain_are_known_as_ratios(frictio
     runs = {"a": _score("fit", 99.0, None)}
     usable = _judged(runs, {"J_p": firm, "b_2": firm}, assumptions=[gain])[1]
     assert usable.answer == "in part"
-    assert usable.headline.startswith("None of them before actuator.gain is measured.")
+    assert usable.headline.startswith("No number can be used before actuator.gain is measured.")
     assert headline in usable.headline
 
 

@@ -177,7 +177,7 @@ def test_an_interrupted_search_is_judged_on_its_prediction_alone() -> None:
     told = judged(interrupted=True, converged=False, estimates={"J_p": firm()})
     assert [a.answer for a in told] == ["no", "not tested", "not tested"]
     assert told[0].reasons == ("The search was interrupted; this is its best so far.",)
-    assert told[0].headline.endswith("Not to be trusted as it stands.")
+    assert told[0].headline.endswith("Do not rely on this model yet.")
     assert {a.headline for a in told[1:]} == {"Not evaluated: interrupted."}
     bad = judged(interrupted=True, estimates={"J_p": firm(status="poorly determined")})[1]
     assert bad.answer == "no"
@@ -312,10 +312,10 @@ def test_what_rests_on_an_assumed_number_is_not_used_before_that_is_measured() -
     assert (one.answer, one.headline) == ("in part", "These numbers can be used: b_2. It is known to 5 % or better.")
     assert one.reasons == ("J_p rests on m_p (assumed).",)
     both = judged(estimates=e, assumptions=[assumed("m_p", J_p=0.5), assumed("l_cg", b_2=0.3, J_p=0.2)])[1]
-    assert both.headline == "None of them before l_cg is measured."
+    assert both.headline == "No number can be used before l_cg is measured."
     assert both.reasons == ("J_p rests on m_p (assumed).", "b_2, J_p rest on l_cg (assumed).")
     apart = judged(estimates=e, assumptions=[assumed("m_p", J_p=0.5), assumed("l_cg", b_2=0.3)])[1]
-    assert apart.headline == "None of them before m_p and l_cg is measured."
+    assert apart.headline == "No number can be used before m_p and l_cg is measured."
 
 
 def test_numbers_bent_by_a_dead_time_are_not_used() -> None:
@@ -323,7 +323,7 @@ def test_numbers_bent_by_a_dead_time_are_not_used() -> None:
     some, all_ = (judged(estimates=e, bent=bent)[1] for bent in (("J_p",), ("J_p", "b_2")))
     assert (some.answer, some.headline) == ("in part", "These numbers can be used: b_2. It is known to 5 % or better.")
     assert some.reasons[0].startswith("J_p: outside their intervals once the drive may act late")
-    assert (all_.answer, all_.headline) == ("no", "None of them before the drive's delay is estimated.")
+    assert (all_.answer, all_.headline) == ("no", "No number can be used before the drive's delay is estimated.")
 
 
 @pytest.mark.parametrize(

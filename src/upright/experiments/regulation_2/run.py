@@ -132,7 +132,7 @@ class Regulation:
     rig : Rig
         As identified.
     truth : Rig or None
-        The twin on which the laws ran, where it was one that is simulated here.
+        The rig on which the laws ran, where its true numbers are known.
     attempts : tuple of Attempt
     ways : tuple of Way
         For the recommended set, on the truth, or on the model where there is no truth.
@@ -202,7 +202,7 @@ def request_for(stand: TestStand, known: Rig) -> RegulationRequest:
 
     The pole sets of Table 1 are for the makers' rigs; for one of one's own all are as much faster as it falls faster.
     """
-    if stand.simulated:
+    if stand.starts_anywhere:
         return RegulationRequest()
     tilt, push = BY_HAND
     request = RegulationRequest(tilt=tilt, push=push, seconds=SECONDS_BY_HAND)
@@ -270,7 +270,7 @@ def run_regulation(
             interrupted = True
             break
     result = Regulation(
-        rig=rig, truth=stand.rig if stand is not None and stand.simulated else None, task=task, request=request,
+        rig=rig, truth=None if stand is None else stand.exact, task=task, request=request,
         attempts=tuple(attempts), ways=(), uncertain=bool(rig.draws), source=source, seed=seed,
         performed=SIMULATED if stand is None or not any(a.measured for a in attempts) else stand.performed,
         interrupted=interrupted,
@@ -309,7 +309,7 @@ def _predicted(
 def _run_attempt(stand: TestStand, attempt: Attempt, task: Task, seed: int, folder: Path) -> MeasuredRun | None:
     """The law of an attempt on the rig; None where it is too likely that a live pendulum falls."""
     share, basis = attempt.before.share, attempt.before.basis
-    if not stand.simulated and share < AT_LEAST:
+    if share < AT_LEAST and not stand.may_fall:
         return None
     driven, pendulum = stand.names
     stand.ask(

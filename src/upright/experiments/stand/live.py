@@ -53,7 +53,9 @@ class LiveStand(TestStand):
         Why laws from a fit that is not trusted drive hardware all the same; without it they are not armed.
     """
 
-    simulated = False
+    attended = True
+    starts_anywhere = False
+    may_fall = False
     file: RigFile
     person: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches

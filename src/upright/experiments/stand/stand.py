@@ -38,8 +38,12 @@ class TestStand(ABC):
 
     Attributes
     ----------
-    simulated : bool
-        Whether it is simulated here, where no fall or limit matters; a twin behind the protocol is not.
+    attended : bool
+        Whether a person is beside it, whose time counts and who does what no drive can.
+    starts_anywhere : bool
+        Whether it can be let go in any state, with its bodies freed, clamped and loaded as an experiment likes.
+    may_fall : bool
+        Whether nothing is hit when a pendulum falls or a body leaves its travel.
     rig : Rig
         What is run. Of a twin that is simulated here these are the true numbers, else those of its description.
     true_rig : Rig or None
@@ -63,7 +67,9 @@ class TestStand(ABC):
         relative standard uncertainty of a piece.
     """
 
-    simulated: ClassVar[bool]
+    attended: ClassVar[bool]
+    starts_anywhere: ClassVar[bool]
+    may_fall: ClassVar[bool]
     rig: Rig
     true_rig: Rig | None = None
     make: Make | None = None
@@ -96,6 +102,11 @@ class TestStand(ABC):
     def twin(self) -> Rig:
         """What a twin truly is; of hardware its description."""
         return self.rig if self.true_rig is None else self.true_rig
+
+    @property
+    def exact(self) -> Rig | None:
+        """The rig with its true numbers, where an experiment may compute with them; None where it is not to know."""
+        return None
 
     @property
     def truth(self) -> Mapping[str, float]:

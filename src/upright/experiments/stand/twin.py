@@ -12,6 +12,7 @@ from upright.control.trial import SUBSTEPS, logged, trial
 from upright.experiments.stand.stand import APPLIED, StandRun, TestStand
 from upright.laws import Law, Rule
 from upright.records import Array, Record
+from upright.rig import Rig
 from upright.simulation import simulate
 
 
@@ -19,7 +20,14 @@ from upright.simulation import simulate
 class TwinStand(TestStand):
     """A twin as a test stand; its `rig` is as it truly is."""
 
-    simulated = True
+    attended = False
+    starts_anywhere = True
+    may_fall = True
+
+    @property
+    def exact(self) -> Rig:
+        """Itself."""
+        return self.rig
 
     def ask(self, sentence: str) -> None:
         """What a person would do is done by the start of the simulation."""

@@ -268,14 +268,14 @@ def run_swing_up(
     progress("swinging up", 0.4)
     ascent = _ascended(stand, law, folder, seconds) if check.sound else None
     tried: tuple[FaultyEncoder, ...] = ()
-    if stand.simulated and check.sound and not stopped():
+    if stand.exact is not None and check.sound and not stopped():
         progress("trying encoders that lie", 0.6)
-        tried = _faulty_encoders(model, stand.rig, law, command, known)
+        tried = _faulty_encoders(model, stand.exact, law, command, known)
     log.to_csv(folder / "sensors.csv")
     if ascent is not None:
         ascent.trial.record.to_csv(folder / "swing_up.csv")
     return SwingUpRun(
-        model=model, truth=stand.rig if stand.simulated else model, log=log, check=check, law=law, ascent=ascent,
+        model=model, truth=stand.exact or model, log=log, check=check, law=law, ascent=ascent,
         faulty=tried,
         source=source, folder=folder, seconds=time.perf_counter() - began, performed=stand.performed,
     )  # fmt: skip

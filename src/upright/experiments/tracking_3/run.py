@@ -316,7 +316,7 @@ def _times_as_fast(model: Rig) -> float:
 def _tried(stand: TestStand, law: Tracker, expected: StepTrial, step: float, folder: Path) -> StepTrial | None:
     """The law on the rig; None where it is predicted to leave a live rig's bounds."""
     safe = math.isinf(expected.tripped) and law.decay > 0 and not expected.effort.saturated
-    if not stand.simulated and not safe:
+    if not (safe or stand.may_fall):
         return None
     stand.ask(
         f"Next is {law.name}. Let everything rest with {stand.names[0]} in the middle of its "

@@ -131,7 +131,7 @@ class Campaign:
     files : dict of str to str
         Names of the logs, by label, where they were written.
     on : LoadedRig or None
-        The body itself, where it is simulated.
+        The body itself, where its true numbers are known.
     """
 
     kind: str
@@ -228,7 +228,7 @@ def run_weighing(stand: TestStand, seed: int, folder: Path, progress: Progress =
         When a live rig was stopped by a limit, or was not loaded.
     """
     rig = stand.rig
-    if not stand.simulated:
+    if not stand.starts_anywhere:
         result = step_stand(stand, folder, progress)
         bare = result.loadings.bare
         known = (Known(name=BODIES[result.kind].inertia, value=bare.value, stderr=bare.stderr),)

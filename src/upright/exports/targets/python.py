@@ -25,7 +25,7 @@ _LANGUAGE = Language(
 def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Text by file name."""
     if single:
-        raise BadInput("Python's numbers are doubles; leave --float out, or take --to c.")
+        raise BadInput("Python's numbers are doubles; leave --float out, or take the target c.")
     if isinstance(made.law, Rule):
         needs = "from math import floor, frexp, inf, isfinite, nan, pi, sqrt\n\n"
         before = f"\n\n{rule.in_python(made)}\n"

@@ -32,8 +32,8 @@ NEGLIGIBLE = 0.02
 RANGE = 10.0
 """A number that nobody measured may be so many times larger or smaller: drafts write its order of magnitude."""
 
-REDEFINES = {"J_p": ("l_cg",)}
-"""Estimates that a number assumed to be zero gives another meaning: l_cg is the length of the simple pendulum then."""
+STANDS_FOR = {"J_p": {"l_cg": "J_A/(m_p l_cg)"}}
+"""What an estimate is worth beside a number assumed to be zero: l_cg is the length of the simple pendulum then."""
 
 
 def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: bool = True) -> tuple[Assumption, ...]:
@@ -68,7 +68,6 @@ def assumptions(best: Optimum, estimates: Mapping[str, Estimate], *, evaluate: b
         out.append(
             Assumption(
                 name=p.name, value=p.value, unit=p.unit, follows=follows, size=size,
-                redefines=tuple(n for n in REDEFINES.get(p.name, ()) if p.value == 0 and n in follows),
                 without=_without(p, follows, estimates, problem), range=_range(p, size),
             )
         )  # fmt: skip
@@ -114,17 +113,20 @@ def _over_ranges(interval: tuple[float, float], name: str, rested: Sequence[Assu
 
 
 def _ratios(a: Assumption, rested: Sequence[Assumption], estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """Estimates that are proportional to an assumed number, per it; they hold what the other assumed ones may be."""
+    """What is known whatever one assumed number is; each holds what the other assumed ones may be."""
     others = [b for b in rested if b.name != a.name]
+    per = {n: f"{n}/{a.name.removeprefix('actuator.')}" for n in proportional(a)}
+    lumped = {n: name for n, name in STANDS_FOR.get(a.name, {}).items() if a.value == 0 and n in a.follows}
     out: dict[str, Estimate] = {}
-    for n in proportional(a):
+    for n, name in {**per, **lumped}.items():
         e = a.without.get(n, estimates[n])
-        scale = 1.0 if n in a.without else 1 / a.value
+        scaled = n in per and n not in a.without
+        scale = 1 / a.value if scaled else 1.0
         rest = [b for b in others if n in resting(b)]
         low, high = _over_ranges(e.interval, n, rest)
-        out[f"{n}/{a.name.removeprefix('actuator.')}"] = replace(
+        out[name] = replace(
             e, value=e.value * scale, stderr=e.stderr * abs(scale), interval=(low * scale, high * scale),
-            unit=e.unit if n in a.without else _per(e.unit, a.unit), rests_on=tuple(b.name for b in rest),
+            unit=_per(e.unit, a.unit) if scaled else e.unit, rests_on=tuple(b.name for b in rest),
             status=_resting(e, [b.name for b in rest]),
         )  # fmt: skip
     return out
@@ -177,8 +179,8 @@ def untouched(a: Assumption) -> list[str]:
 
 
 def resting(a: Assumption) -> list[str]:
-    """Names that are numbers of the assumed one: they would move with it, or may, and it gives them no new meaning."""
-    free = {*untouched(a), *a.redefines}
+    """Names that would move with the assumed number, or may."""
+    free = untouched(a)
     return [n for n in a.follows if n not in free]
 
 
@@ -223,8 +225,9 @@ def assumption_sentences(rested: Sequence[Assumption]) -> tuple[str, ...]:
                 parts.append(f"for every percent of it {shifts} would follow")
             elif other:
                 parts.append(f"{', '.join(other)} would move with it")
-            if a.redefines:
-                parts.append(f"{', '.join(a.redefines)} takes what it would explain into its own value")
+            if a.value == 0 and a.ratios:
+                verb = "does" if len(a.ratios) == 1 else "do"
+                parts.append(f"{', '.join(a.ratios)} {verb} not")
             if free:
                 parts.append(f"{', '.join(free)} {'does' if len(free) == 1 else 'do'} not depend on it")
         sentences.append("; ".join(parts) + "." + (f" {remedy(a)}" if moved else ""))

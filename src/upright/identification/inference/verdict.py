@@ -166,7 +166,7 @@ def _predicts(evidence: Evidence) -> Judgement:
         )
     if against:
         return Judgement(
-            question=PREDICTS, answer="no", headline=f"{explains}Not to be trusted as it stands.",
+            question=PREDICTS, answer="no", headline=f"{explains}Do not rely on this model yet.",
             reasons=(*against, *notes),
         )  # fmt: skip
     if not predicted:
@@ -339,14 +339,14 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
     elif guessed:
         answer, headline = "in part", f"As numbers of a plant that was guessed.{_and(ratios)}"
     elif evidence.bent and not free:
-        answer, headline = "no", "None of them before the drive's delay is estimated."
+        answer, headline = "no", "No number can be used before the drive's delay is estimated."
     elif reasons:
         answer, headline = "in part", f"These numbers can be used: {known}{_and(ratios)}"
         if not free:
             missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in sure))
-            headline = f"None of them before {missing} is measured.{_and(ratios)}"
+            headline = f"No number can be used before {missing} is measured.{_and(ratios)}"
             if not missing:
-                headline = "None alone, only their sums."
+                headline = "No number alone, only sums."
     else:
         answer, headline = "yes", f"All numbers can be used: {known}" if sure else "Nothing was estimated."
     advice = ""
@@ -363,7 +363,7 @@ DETERMINED = ("well determined", "rests on", "tied to")
 
 
 def _ratios(evidence: Evidence) -> dict[str, Estimate]:
-    """What is known per assumed number, of numbers that the data determine."""
+    """What is known whatever the assumed numbers are, of what the data determine."""
     return {
         name: e for a in evidence.assumptions for name, e in a.ratios.items()
         if e.status.startswith(DETERMINED) and e.half < 1
@@ -374,7 +374,7 @@ def _and(ratios: Mapping[str, Estimate]) -> str:
     """A sentence of the ratios that are known, each with its interval."""
     if not ratios:
         return ""
-    return f" Known per assumed number: {'; '.join(f'{n} = {_with_interval(e)}' for n, e in ratios.items())}."
+    return f" Known all the same: {'; '.join(f'{n} = {_with_interval(e)}' for n, e in ratios.items())}."
 
 
 def _with_interval(e: Estimate) -> str:

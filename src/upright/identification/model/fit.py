@@ -80,9 +80,9 @@ class Assumption:
     `follows` are percent by which each estimate would change per percent of its `size`, not a number where that was not
     evaluated, `without` the estimates proportional to it, per unit of the command and of the encoders. The size is its
     absolute value; of one assumed to be zero, what changes the runs as much as the most influential estimate does.
-    `redefines` names estimates that it gives another meaning, under which they hold whatever its true value is.
-    Nobody measured it, so it may lie anywhere in its `range`. `ratios` are the powers of it that estimates are
-    proportional to, each estimate per such a power, by what it is called: ``b_2/m_p``.
+    Nobody measured it, so it may lie anywhere in its `range`. `ratios` are known whatever it is, by what they are
+    called: estimates per what they are proportional to, ``b_2/m_p``, and what an estimate is worth beside a number
+    assumed to be zero, ``J_A/(m_p l_cg)``.
     """
 
     name: str
@@ -91,7 +91,6 @@ class Assumption:
     follows: Mapping[str, float]
     without: Mapping[str, Estimate]
     size: float = 0.0
-    redefines: tuple[str, ...] = ()
     range: tuple[float, float] = (-math.inf, math.inf)
     ratios: Mapping[str, Estimate] = field(default_factory=dict[str, Estimate])
 

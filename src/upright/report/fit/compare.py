@@ -87,7 +87,7 @@ def chapter(compared: Comparison, *, command: str) -> Chapter:
               and run.worst(BLACK_BOX) > run.worst(best)]  # fmt: skip
     doubted = [who for who, trusted in compared.trusted.items() if not trusted]
     warnings = [
-        *(f"{who} is not to be trusted by its own verdict." for who in doubted),
+        *(f"Do not rely on {who} yet: that is its own verdict." for who in doubted),
         *(
             f"'{label}' was fitted by {', '.join(run.fitted_by)}: what these reach there is no prediction."
             for label, run in compared.runs.items()

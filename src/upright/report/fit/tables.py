@@ -86,11 +86,11 @@ def within(e: Estimate, true: float) -> bool:
 
 
 def ratio_table(fit: Fit) -> Table:
-    """What the data tell of numbers that rest on assumed ones: their ratios to these."""
+    """What the data tell whatever the assumed numbers are: ratios to them, and lumped values."""
     rows = [(n, e) for a in fit.assumptions for n, e in a.ratios.items()]
     return Table(
-        caption="What is known: per assumed number; per gain in units of the command, seconds and counts",
-        headings=("ratio", *_ESTIMATE[:-1]), numbers=(1, 2, 3), badge=5,
+        caption="What is known whatever the assumed numbers are; per gain in units of the command, seconds and counts",
+        headings=("quantity", *_ESTIMATE[:-1]), numbers=(1, 2, 3), badge=5,
         rows=tuple((plain(n), *_estimate(n, e, None)[:-1]) for n, e in rows),
     )  # fmt: skip
 
