@@ -71,7 +71,7 @@ def _of_rule(made: SampledController, first: list[str], last: list[str]) -> str:
     parameters, initial = (", ".join(constant(x, False) for x in values) or "0" for values in rule.rule_numbers(made))
     copied = "for (i = 0; i < LAW_REFERENCES; i++)\n        asked[i] = r[i];" if made.references else "(void)r;"
     return filled(
-        "rule.c.in", rule=rule.in_c(made), parameters=parameters, initial=initial, found=inputs + states,
+        "rule.c.in", rule=rule.in_c(made), parameters=parameters, initial=initial, numbers=inputs + states,
         checked=indented(first), body=indented(last), copied=copied, inputs=inputs, states=states,
         commands=indented(f"law_real c{j} = found[{j}];" for j in range(inputs)),
     )  # fmt: skip
