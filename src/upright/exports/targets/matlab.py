@@ -50,8 +50,9 @@ def selftest_function(test: ReplayVector, *, single: bool) -> str:
     with_r, first_r = (", asked(k, :)", ", asked(1, :)") if test.references.shape[1] else ("", "")
     references = _table("asked", test.references) if with_r else ""
     return filled(
-        "law_selftest.m.in", given=_table("given", test.readings), references=references, with_r=with_r, first_r=first_r,
-        expected=_table("expected", test.commands), allowed=f"{test.single if single else 0.0:.17g}",
+        "law_selftest.m.in", given=_table("given", test.readings), references=references, with_r=with_r,
+        first_r=first_r, expected=_table("expected", test.commands),
+        allowed=f"{test.single if single else 0.0:.17g}",
     )  # fmt: skip
 
 
