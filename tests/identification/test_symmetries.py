@@ -25,9 +25,9 @@ SHAFT = {"J_1": 0.01, "J_2": 0.012, "k_12": 2.0, "c_1": 0.01, "c_2": 0.008, "f_1
 TURNING = rig(DISKS, SHAFT, {"J_2": 0.02, "k_12": 1.5, "c_1": 0.02, "f_1c": 0.01})
 
 
-def swings(**run) -> list[Run]:
+def swings(seconds: float = 9.0, **run) -> list[Run]:
     return [
-        noisy(swing(RUBBED, angle=angle, seconds=9, dt=DT, label=label, role=role, **run), 1e-3, seed)
+        noisy(swing(RUBBED, angle=angle, seconds=seconds, dt=DT, label=label, role=role, **run), 1e-3, seed)
         for seed, (label, angle, role) in enumerate([("a", 1.2, "fit"), ("b", 0.8, "fit"), ("c", 1.0, "predict")])
     ]
 
@@ -54,6 +54,7 @@ def held(runs: Sequence[Run]) -> list[Run]:
 
 CASES = {
     "free": (SWINGING, swings()),
+    "of two periods": (SWINGING, swings(2.5)),
     "windows": (SWINGING, swings(horizon=1.0)),
     "filtered": (SWINGING, swings(horizon=(0.5, 1.0), restart="kalman", resolution=(1e-3,))),
     "offsets": (SWINGING, swings(unknown=("initial", "offset"))),

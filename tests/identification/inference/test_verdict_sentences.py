@@ -347,7 +347,7 @@ def test_a_length_is_lumped_where_it_is_asked_and_the_inertia_is_known_to_be_non
 def test_a_guessed_plant_is_in_part_whatever_its_numbers() -> None:
     guessed = replace(rig(Pendulum, PENDULUM, {}), guessed=True)
     told = judged(estimates={"J_p": firm()}, rig=guessed)[1]
-    assert (told.answer, told.headline) == ("in part", "As numbers of a plant that was guessed.")
+    assert (told.answer, told.headline) == ("in part", "Only if the rig is the plant that was guessed.")
     confirmed = {"a": score(theta=99.0), "b": score("predict", theta=95.0)}
     assert judged(confirmed, {"J_p": firm()}, rig=guessed)[1].answer == "yes"
     assert judged(estimates={"J_p": firm(status="poorly determined")}, rig=guessed)[1].answer == "no"

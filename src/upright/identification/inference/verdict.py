@@ -337,7 +337,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
-        answer, headline = "in part", f"As numbers of a plant that was guessed.{_and(ratios)}"
+        answer, headline = "in part", f"Only if the rig is the plant that was guessed.{_and(ratios)}"
     elif evidence.bent and not free:
         answer, headline = "no", "No number can be used before the drive's delay is estimated."
     elif reasons:
