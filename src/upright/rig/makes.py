@@ -49,7 +49,6 @@ class BodyOnSpring:
 
     Attributes
     ----------
-    kind : {"rectilinear", "torsional"}
     rig : Rig
         As designed, without added masses.
     step : float
