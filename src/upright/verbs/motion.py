@@ -17,7 +17,7 @@ from upright.physics import Plant
 from upright.records import Record
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
-from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin_origin
+from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin
 
 if TYPE_CHECKING:
     from upright.rig import Rig
