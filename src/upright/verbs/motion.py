@@ -17,7 +17,7 @@ from upright.physics import Plant
 from upright.records import Record
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
-from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated
+from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin
 
 if TYPE_CHECKING:
     from upright.rig import Rig
@@ -127,7 +127,7 @@ def simulate(
         t=t, signals=signals | commands,
         units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
         inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
-        provenance=simulated(type(plant).__name__),
+        provenance=simulated_origin(type(plant).__name__),
     )  # fmt: skip
 
 

@@ -36,8 +36,8 @@ _KEYWORDS = {
 
 
 def helpers(text: str) -> str:
-    """Functions of ``helpers.c`` that a text calls."""
-    own = re.split(r"\n\n(?=static)", filled("helpers.c").strip())[1:]
+    """Functions of ``arithmetic.c`` that a text calls."""
+    own = re.split(r"\n\n(?=static)", filled("arithmetic.c").strip())[1:]
     return "".join(f"{h}\n" for h in own if f"{h.partition('(')[0].split()[-1]}(" in text)
 
 

@@ -38,11 +38,11 @@ def motion_of_linear(
     columns |= dict(zip(sampled.inputs, u.T, strict=True))
     return Record(
         t=t, signals=columns, units={n: model.units.get(n, "") for n in columns}, inputs=tuple(model.inputs),
-        outputs=tuple(model.outputs), provenance=simulated(model.name or "a linear model"),
+        outputs=tuple(model.outputs), provenance=simulated_origin(model.name or "a linear model"),
     )  # fmt: skip
 
 
-def simulated(rig: str) -> Provenance:
+def simulated_origin(rig: str) -> Provenance:
     """Origin of a record of a rig that was not touched."""
     return Provenance(reader="simulation", rig=rig, notes=("This log was simulated; no rig was touched.",))
 
