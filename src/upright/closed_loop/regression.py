@@ -203,8 +203,8 @@ def bracket(at: Callable[[float], Columns], u: Array, rows: Rows) -> float:
 
     best = int(np.argmin([loss(p) for p in POLES]))
     around = POLES[max(best - 1, 0)], POLES[best + 1] if best + 1 < len(POLES) else 0.9995
-    found = minimize_scalar(loss, bounds=around, method="bounded", options={"xatol": 1e-3 * (1.001 - around[1])})
-    return float(found.x)
+    best_pole = minimize_scalar(loss, bounds=around, method="bounded", options={"xatol": 1e-3 * (1.001 - around[1])})
+    return float(best_pole.x)
 
 
 def refine(at: Callable[[float], Columns], u: Array, rows: Rows, pole: float) -> float:
