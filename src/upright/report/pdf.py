@@ -47,13 +47,10 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
         """Pictures as files beside the template, formulas as trees of MathML's elements, states with their tone."""
         if isinstance(value, Picture):
             name = f"figure-{len(files)}.svg"
-            first = _FIRST.search(value.svg)  # of a chart the drawing for a wide column
-            drawn = first[0] if first else value.svg
-            share = _SHARE.search(drawn)
-            markup = _PROPERTY.sub(r"\1", _SHARE.sub("", drawn))
-            files[name] = markup.replace("<svg", _ROOT, 1).encode()
+            drawn, share = standalone(value.svg)
+            files[name] = drawn.encode()
             plain = {"caption": value.caption, "description": value.description, "file": name}
-            return {"kind": "Picture", **plain, "share": int(share[1]) if share else 100}
+            return {"kind": "Picture", **plain, "share": share}
         if isinstance(value, Formula):
             return {"kind": "Formula", "tree": _tree(ElementTree.fromstring(value.markup))}
         if isinstance(value, Symbol):
@@ -75,6 +72,14 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     to_pdf: Any = typst.compile  # its stub knows no files by name
     return replace_file(path, to_pdf(files, font_paths=[str(fonts)], ignore_system_fonts=True))
+
+
+def standalone(markup: str) -> tuple[str, int]:
+    """A picture's drawing, of a chart that for a desk, as a file of its own, and the share [%] of a column it takes."""
+    first = _FIRST.search(markup)
+    drawn = first[0] if first else markup
+    share = _SHARE.search(drawn)
+    return _PROPERTY.sub(r"\1", _SHARE.sub("", drawn)).replace("<svg", _ROOT, 1), int(share[1]) if share else 100
 
 
 def _tree(node: ElementTree.Element) -> dict[str, Any]:

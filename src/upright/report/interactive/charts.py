@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -168,6 +169,13 @@ class Chart:
     def picture(self, name: str, *, caption: str, description: str) -> Picture:
         """It, with its caption, for a chapter."""
         return Picture(name=name, draw=lambda: self, interactive=self.values, caption=caption, description=description)
+
+    def save(self, path: Path) -> Path:
+        """Write the drawing for a desk by itself, as SVG."""
+        from upright.files import replace_file
+        from upright.report.pdf import standalone
+
+        return replace_file(path, standalone(self.svg("chart"))[0].encode())
 
     def _repr_html_(self) -> str:
         """It in a notebook, where a cursor reads it as in a page."""
