@@ -12,7 +12,7 @@ import functools
 import math
 import os
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,13 +71,12 @@ def timed(name: str, seed: int) -> tuple[float, float]:
     return ended(name, seed), time.process_time() - began
 
 
-def within(name: str, seeds: Iterable[int], seconds: float, workers: Workers) -> list[tuple[float, float]]:
-    """Costs and CPU seconds of searches, one after another until these seconds are spent."""
+def within(name: str, starts: int, seconds: float, workers: Workers) -> list[tuple[float, float]]:
+    """Costs and CPU seconds of searches, as many at a time as there are workers, until these seconds are spent."""
     done: list[tuple[float, float]] = []
-    for seed in seeds:
-        if len(done) >= FEWEST and sum(cpu for _, cpu in done) > seconds:
-            break
-        done += of_each(functools.partial(timed, name), [seed], workers)[0]
+    while len(done) < starts and (len(done) < FEWEST or sum(cpu for _, cpu in done) < seconds):
+        seeds = range(len(done) + 1, min(starts, len(done) + workers.number) + 1)
+        done += of_each(functools.partial(timed, name), seeds, workers)[0]
     return done
 
 
@@ -92,13 +91,13 @@ def run(
     for name in studies()[:: 6 if quick else 1]:
         progress(name)
         own = ended(name, 0)
-        done = within(name, range(1, (QUICK if quick else starts) + 1), seconds, workers)
+        done = within(name, QUICK if quick else starts, seconds, workers)
         costs, cpu = [cost for cost, _ in done], float(np.median([taken for _, taken in done]))
         least = min(own, *costs)
         found = int(np.sum(np.array(costs) <= (1 + NEAR) * least))
         note = f"{found} of {len(costs)} starts ({100 * found / len(costs):.3g} %; asked 95) end within {100 * NEAR:g} "
         note += f"% of the lowest cost known; the study's own guesses at {own / least:.4g} times that; {cpu:.2g} s CPU "
-        lines.append(Line(contender=name, seconds=(cpu,) * 3, note=note + "each"))
+        lines.append(Line(contender=name, seconds=(cpu, cpu, cpu), note=note + "each"))
         if markdown is not None:  # what is done is kept, should somebody interrupt
             publish(markdown, "starts", "Random starts", __doc__, lines)
     return lines
