@@ -3,7 +3,7 @@
 Every guess is multiplied by ``exp(0.3 z)``, z normal: a factor of two is one in fifty. Costs are those of the whole
 model, weighed as by the study's own fit, and a search has found the lowest known where it ends within half a percent of
 it. Of each study as many starts are run, of 300, as a number of CPU seconds allows (`--starts`, `--seconds`), but at
-least three. Needs UPRIGHT_REAL_DATA. Asked: 95 % of the starts.
+least three: the page is of 8 seconds a study. Needs UPRIGHT_REAL_DATA. Asked: 95 % of the starts.
 """
 
 from __future__ import annotations
