@@ -24,7 +24,8 @@ class StateSpace(Shown):
     """Linear model ``x' = A x + B u, y = C x + D u``; with a period `dt`, ``x[k+1] = A x[k] + B u[k]``.
 
     It unpacks as ``A, B, C, D`` (a sampled one with its dt behind them), so that ``control.ss(*model)`` and
-    ``scipy.signal.StateSpace(*model[:4])`` take it.
+    ``scipy.signal.StateSpace(*model[:4])`` take it. `to_control` keeps the names of its signals. python-control takes
+    nothing but its own classes, so ``control.ss(model)`` is its TypeError.
 
     Parameters
     ----------

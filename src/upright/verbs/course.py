@@ -285,11 +285,11 @@ def reproduce(
         Of a `Reproduced`.
     """
     from upright.paper.chapter import chapter
-    from upright.paper.reproduce import reproduce as again
+    from upright.paper.reproduce import reproduce_tables
     from upright.rig.makes import NOMINAL
 
     at = folder_if_given(out, pdf)
-    result = again(NOMINAL, seed)
+    result = reproduce_tables(NOMINAL, seed)
     page = chapter(result)
     return Answer(result, page, [] if at is None else write_page(page, at / "reproduce.html", pdf))
 

@@ -11,14 +11,14 @@ from upright.exports.vector import ReplayVector
 from upright.laws.linear import Array
 
 
-def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {"law_step.m": step_function(made, single=single), "law_selftest.m": selftest_function(test, single=single)}
 
 
 def simulink_block(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name for Simulink: the same function, a level-2 S-function that calls it, what makes its block."""
-    return {**files(made, test, single=single), "law_sfun.m": _s_function(made, single=single), "law_block.m": _BLOCK}
+    return {**_files(made, test, single=single), "law_sfun.m": _s_function(made, single=single), "law_block.m": _BLOCK}
 
 
 def step_function(made: SampledController, *, single: bool) -> str:
@@ -158,7 +158,7 @@ open_system('law_model');
 """
 
 MATLAB = LawTarget(
-    name="matlab", order=25, title="MATLAB and GNU Octave", write=files,
+    name="matlab", order=25, title="MATLAB and GNU Octave", write=_files,
     test="octave-cli --path {folder} --eval law_selftest",
     onward="[u, s] = law_step(s, y) at every sample, with s = [] before the first.",
 )  # fmt: skip

@@ -21,7 +21,7 @@ _LANGUAGE = Language(
 )  # fmt: skip
 
 
-def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Text by file name."""
     if single:
         raise BadInput("Python's numbers are doubles; leave --float out, or take --to c.")
@@ -112,6 +112,6 @@ if __name__ == "__main__":
 
 
 TARGET = LawTarget(
-    name="python", order=20, title="Python", write=files, rules=True,
+    name="python", order=20, title="Python", write=_files, rules=True,
     test="python {folder}/law.py", onward="law = Law(); u = law.step(y) at every sample.",
 )  # fmt: skip
