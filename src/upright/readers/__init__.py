@@ -13,7 +13,7 @@ from upright.readers.reader import READERS, Reader
 from upright.readers.source import Source, load
 from upright.records import PathLike, Record
 
-__all__ = ["READERS", "inspect", "read", "recognise"]
+__all__ = ["READERS", "inspect", "read", "reader_of"]
 
 
 def read(path: PathLike, *, reader: str | None = None) -> Record:

@@ -233,7 +233,7 @@ NOMINAL = cast("Furuta", MAKES["furuta"].rig.plant).replace(b_1=6e-4, b_1c=1.5e-
 """The Furuta pendulum as designed, its drive belt off."""
 
 
-def make_named(key: str, among: tuple[str, ...] = tuple(MAKES), *, option: str = "--rig") -> Make:
+def make_named(key: str | None, among: tuple[str, ...] = tuple(MAKES), *, option: str = "--rig") -> Make:
     """Make that an option of the command line names.
 
     Raises
@@ -241,8 +241,8 @@ def make_named(key: str, among: tuple[str, ...] = tuple(MAKES), *, option: str =
     BadInput
         When it is none of those that are `among` the choices.
     """
-    if key not in among:
-        raise BadInput(f"{option} is one of {', '.join(among)}, got '{key}'; {nearest(key, among)}")
+    if key is None or key not in among:
+        raise BadInput(f"{option} is one of {', '.join(among)}, got '{key}'; {nearest(key or '', among)}")
     return MAKES[key]
 
 
@@ -269,7 +269,7 @@ def make_of_rig(rig: Rig) -> Make:
     )
 
 
-def make_of_vendor(vendor: str, plant: Plant) -> Make | None:
+def make_of_vendor(vendor: str | None, plant: Plant) -> Make | None:
     """Make of a vendor that has this plant, None where he has none, or none was named."""
     return next((m for m in MAKES.values() if m.vendor == vendor and type(m.rig.plant) is type(plant)), None)
 

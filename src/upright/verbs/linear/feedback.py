@@ -115,10 +115,10 @@ def _model_first(verb: Callable[P, R]) -> Callable[P, R]:
             )  # fmt: skip
             args = ((args[0], args[1]), *args[2:])
         try:
-            about.bind(*args, **kwargs)
+            bound = about.bind(*args, **kwargs)
         except TypeError as error:
             raise BadInput(f"{name} is called as {name}{_form(about)}: {error}.") from None
-        return verb(*args, **kwargs)
+        return verb(*bound.args, **bound.kwargs)
 
     return called
 
@@ -129,7 +129,7 @@ def _form(about: Any) -> str:
     return str(about.replace(parameters=shown, return_annotation=about.empty))
 
 
-def _read(model: Any, verb: str) -> StateSpace:
+def _read(model: LinearForm, verb: str) -> StateSpace:
     plant = model if isinstance(model, Plant) else getattr(model, "plant", None)
     if isinstance(plant, Plant):
         raise BadInput(
@@ -384,7 +384,7 @@ def prefilter(model: LinearForm, K: ArrayLike | Gains, output: int | str = 0) ->
     if isinstance(output, str) and output not in names:
         raise BadInput(f"this model has no output '{output}'; {nearest(output, names)}")
     i = names.index(output) if isinstance(output, str) else output
-    if not isinstance(i, int | np.integer) or not 0 <= i < len(names):
+    if not isinstance(i, int | np.integer) or not 0 <= i < len(names):  # type: ignore[reportUnnecessaryIsInstance]
         raise BadInput(f"output is a number from 0 to {len(names) - 1} or one of {', '.join(names)}, got {output}.")
     k = _row_of_gains(K)
     if k.shape != (1, model.A.shape[0]) or model.B.shape[1] != 1:
