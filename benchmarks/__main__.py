@@ -143,7 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--judged",
         type=Path,
         metavar="FILE",
-        help="changes that make no difference, each `file:line before -> after  # reason`",
+        help="changes that do not matter, each `file:line before -> after  # reason`; default those beside the program",
     )
     asked = parser.parse_args(arguments)
     try:

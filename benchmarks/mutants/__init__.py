@@ -3,9 +3,15 @@
 Operators, comparisons, constants, guards, indices and signs: each change is one place, drawn from all of them, and the
 quick tests that cover it run until one fails, the nearest and cheapest first, 60 s of CPU of them. `--slow` then runs
 the slow tests that cover what no quick one noticed, 120 s of them; `--seconds` allows less. A test that hangs has
-noticed. Intervals are Wilson's of 95 %. What no test noticed is listed; a change that a person judged to make no
-difference is left out of the shares when a file names it: its lines are `file:line before -> after  # reason`, as they
-are listed.
+noticed. Intervals are Wilson's of 95 %. What no test noticed is listed.
+
+A change matters when it makes something false that the project says to anybody (a docstring, a comment with its source,
+a page, help, the sentence of an error, a number within the interval it is shown with, what is promised for safety), or
+when a figure or a result becomes wrong. It does not matter when the program stays equivalent, when a tuning number
+moves within the freedom that its comment leaves and every claim still holds, or when only speed or the layout of a
+picture changes. Whatever went unnoticed is judged by that, one by one; what does not matter is written with its reason
+into `benchmarks/mutants/judged.txt`, lines `file:line before -> after  # reason`, and left out of the shares. What
+nobody judged counts as unnoticed.
 """
 
 from __future__ import annotations
@@ -14,7 +20,7 @@ import math
 import os
 import random
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from benchmarks.measure import Line, Target, page
@@ -27,6 +33,7 @@ ROOT = Path(__file__).parents[2]
 UNNOTICED = 0.10
 """Share of changes that may go unnoticed."""
 NOT = ": share not noticed"
+JUDGED = Path(__file__).with_name("judged.txt")
 DEEPER = "identification"
 """Room whose own rooms are counted one by one."""
 
@@ -67,10 +74,11 @@ def interval(hits: int, of: int) -> tuple[float, float]:
     return (middle - half) / (1 + z * z / of), (middle + half) / (1 + z * z / of)
 
 
-def judged(file: Path | None) -> set[str]:
-    """Changes that make no difference, by a file: everything before `  # ` in each line."""
-    lines = file.read_text(encoding="utf-8").splitlines() if file else []
-    return {" ".join(line.rpartition("  # ")[0].split()) for line in lines if "  # " in line}
+def judged(file: Path) -> dict[str, str]:
+    """Reason why a change does not matter, by the change: a line of a file has both, `  # ` between them."""
+    lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
+    parts = [line.rpartition("  # ") for line in lines if "  # " in line]
+    return {" ".join(change.split()): reason.strip() for change, _, reason in parts}
 
 
 def run(
@@ -81,7 +89,7 @@ def run(
     """A line for each room, one or two for all, and one for each change that went unnoticed."""
     cache = Path(os.environ["UPRIGHT_CACHE"]) if os.environ.get("UPRIGHT_CACHE") else None
     kept = folder or (cache or ROOT / "build") / "mutants"
-    harmless = judged(verdicts)
+    harmless = judged(verdicts or JUDGED)
     changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
     covered = map_of(ROOT, kept, workers, progress)
     slower = map_of(ROOT, kept, workers, progress, slow=True) if slow else None
@@ -94,10 +102,11 @@ def run(
             left = [o.change for o in done if not o.noticed and _line(o) not in harmless]
             by_slow = tried(benches, left, slower, LONGER * seconds, before[1], progress)
     lines = table(done, harmless, by_slow)
+    passed = {_line(o): harmless[_line(o)] for o in done if _line(o) in harmless}
     if markdown is not None:
         where = f", within {within}" if within else ""
         asked = f"Sample {len(changes)}, seed {seed}{where}; {len(done)} were tried, with {seconds:g} s of quick tests."
-        text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines))
+        text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines, passed))
         markdown.write_text(text, encoding="utf-8")
     return lines
 
@@ -116,7 +125,7 @@ def table(
     lines = [_share(name, [o.noticed for o in counted if room(o.change.path) == name])
              for name in sorted({room(o.change.path) for o in counted})]  # fmt: skip
     judged_out = len(done) - len(counted)
-    note = f"; {judged_out} judged to make no difference" * bool(judged_out)
+    note = f"; {judged_out} judged not to matter" * bool(judged_out)
     lines.append(_share("all", [o.noticed for o in counted], asked=True, note=note))
     slowly = {o.change: o for o in by_slow or ()}
     if by_slow is not None:
@@ -148,12 +157,13 @@ def _share(name: str, noticed: Sequence[bool], *, asked: bool = False, note: str
     )  # fmt: skip
 
 
-def _body(asked: str, lines: Sequence[Line]) -> list[str]:
-    """Shares as a table, then the changes that no quick test noticed."""
+def _body(asked: str, lines: Sequence[Line], passed: Mapping[str, str]) -> list[str]:
+    """Shares as a table, then the changes that no quick test noticed, and those that do not matter."""
     shares = [line for line in lines if line.contender.endswith(NOT)]
     listed = [line for line in lines if not line.contender.endswith(NOT)]
     return [
         asked, "", "| room | noticed |", "|---|---|",
         *(f"| {line.contender.removesuffix(NOT)} | {line.note} |" for line in shares),
         "", "Not noticed by a quick test:", "", *(f"- `{line.contender}` `{line.note}`" for line in listed),
+        "", "Not noticed, and judged not to matter:", "", *(f"- `{change}`: {why}" for change, why in passed.items()),
     ]  # fmt: skip

@@ -31,8 +31,8 @@ MAPS = 8
 """Maps kept of other trees."""
 START = 0.02
 """Seconds that the shortest test costs all the same."""
-BATCH = 8
-"""Files of slow tests that run before the map is kept."""
+BATCH, SLOW_BATCH = 12, 8
+"""Files of quick and of slow tests that run before the map is kept."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], Non
     progress(f"{name} map in {folder}: {len(changed)} of {len(tests)} files of tests run under coverage")
     whole = moved(old, sources, set(files) - set(changed))
     ran = {p: digest for p, digest in files.items() if p not in changed}
-    size = BATCH if slow else max(len(changed), 1)
+    size = SLOW_BATCH if slow else BATCH
     for batch in [changed[i : i + size] for i in range(0, len(changed), size)] or [[]]:
         if batch:
             with tempfile.TemporaryDirectory(prefix="upright-covering-") as place:

@@ -149,6 +149,12 @@ from scipy.io import savemat  # stands for MATLAB's save
 savemat("model.mat", {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "Ts": 0.0})
 up.from_matlab("model.mat").poles()
 
+# %% from_mjcf
+pole = '<inertial pos="0 0 -0.2" mass="0.3" diaginertia="2e-3 2e-3 1e-5"/>'
+with open("rig.xml", "w") as file:  # stands for a model of your own
+    file.write(f'<mujoco><worldbody><body><joint axis="0 1 0"/>{pole}</body></worldbody></mujoco>')
+up.from_mjcf("rig.xml").plant.linear("hanging").poles()
+
 # %% place
 gains = up.place(rig.linear("inverted"), [-4 + 2j, -4 - 2j, -17, -3])
 gains

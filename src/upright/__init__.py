@@ -21,7 +21,7 @@ Runs        run, rig_doctor, rig_check; log_show, log_tail, log_recover, log_con
             firmware_build, firmware_flash, firmware_pins
 Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
-Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; every verb takes it
+Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; from_mjcf: that of MuJoCo
 Control     StateSpace, from_matlab, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design,
             export, regulate, swing_up, track, play; Law, Rule
 Course      lab, reproduce, survey
@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from upright.verbs.linear.matlab import from_matlab
     from upright.verbs.log import doctor, init, law, read, show
     from upright.verbs.logs import log_convert, log_recover, log_replay, log_show, log_tail
+    from upright.verbs.mjcf import from_mjcf
     from upright.verbs.model.compare import compare
     from upright.verbs.model.frequency import frequency
     from upright.verbs.model.identify import identify
@@ -118,6 +119,7 @@ _HOMES = {
     "systems": ("StateSpace",),
     "verbs.linear.feedback": ("dlqr", "hold", "lqr", "margins", "observer", "place", "prefilter"),
     "verbs.linear.matlab": ("from_matlab",),
+    "verbs.mjcf": ("from_mjcf",),
     "verbs.model.compare": ("compare",),
     "verbs.model.frequency": ("frequency",),
     "verbs.model.identify": ("identify",),
@@ -133,7 +135,7 @@ __all__ = [
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rig", "Rule",
     "StateSpace",
     "UprightError", "__version__", "chain", "chance", "compare", "design", "dlqr", "doctor", "export",
-    "firmware_build", "firmware_flash", "firmware_pins", "frequency", "from_matlab", "hold",
+    "firmware_build", "firmware_flash", "firmware_pins", "frequency", "from_matlab", "from_mjcf", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
     "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "play", "predict", "prefilter", "quantity",
     "read", "regulate", "reproduce", "rig_check", "rig_doctor", "run", "show", "simulate", "survey", "swing_up",
@@ -146,6 +148,10 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'upright' has no attribute {name!r}")
     value = getattr(import_module(f"upright.{_HOME[name]}"), name)
+    if _HOME[name].startswith("verbs."):
+        from upright.verbs.in_python import worded_for_python
+
+        value = worded_for_python(value)
     globals()[name] = value
     return value
 

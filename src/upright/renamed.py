@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Callable, Mapping
 from functools import wraps
@@ -36,7 +37,9 @@ def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:
             for name in former.keys() & options.keys():
                 now, made = former[name]
                 warnings.warn(
-                    f"{name_of_verb}({name}=...) is going: say {now}=... instead.", DeprecationWarning, stacklevel=2
+                    f"{name_of_verb}({name}=...) is going: say {now}=... instead.",
+                    DeprecationWarning,
+                    stacklevel=outside(),
                 )
                 value = options.pop(name)
                 if value is None or value == "":
@@ -49,6 +52,14 @@ def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:
         return called  # type: ignore[return-value]
 
     return declare
+
+
+def outside() -> int:
+    """Level, for `warnings.warn`, of the first caller that is not of this package."""
+    frame, level = inspect.currentframe(), 0
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "upright":
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def former(now: str) -> property:

@@ -98,7 +98,7 @@ def test_what_is_no_law_to_be_run_is_refused(change, words, designed, tmp_path):
 def test_a_fit_is_told_from_a_design(tmp_path):
     path = tmp_path / "fit.json"
     path.write_text('{"plant": "furuta", "parameters": {}}')
-    assert "--to gymnasium, mjcf or fmu" in upright("export", path, "--to", "c").stderr
+    assert "goes to gymnasium, mjcf or fmu" in upright("export", path, "--to", "c").stderr
 
 
 def test_what_design_prints_as_json_is_taken_too(designed, tmp_path):

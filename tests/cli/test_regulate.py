@@ -42,7 +42,7 @@ def test_a_set_is_told_and_run(fit, tmp_path):
     assert outcome.exit_code == 0, outcome.stderr
     told = " ".join(outcome.stdout.split())
     assert "measured: stabilised" in told
-    assert "The run agreed with that." in told
+    assert "The run agreed with its prediction." in told
     assert f"upright regulate {fit} --seed 0" in told
     assert (tmp_path / "out" / "regulation_set_3.csv").exists()
     assert "Holding it upright" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -189,3 +189,40 @@ def test_what_a_law_misses_is_told_in_percent_of_the_command(every: int, said: s
     assert ("every" in partial.sentence) is (every > 1)
     assert said in partial.sentence
     assert replace(partial, reproduced=found.recorded + rough).quality == "poor"
+
+
+def changed(record: Record, later: float = 0.0, **times: float) -> Record:
+    """A log on another clock, columns multiplied."""
+    signals = {n: times.get(n, 1.0) * x for n, x in record.signals.items()}
+    return replace(record, t=record.t + later, signals=signals)
+
+
+@pytest.mark.parametrize(
+    ("program", "rounded"),
+    [
+        ({"kp": 4.0, "ki": 3.0, "kd": 0.2, "tau": 0.013}, {"count": 2.0**-10, "step": 2.0**-7}),
+        ({"kp": 4.0, "kd": 0.1, "second": 0.5, "limit": 2.5}, {}),
+    ],
+    ids=["rounded", "exact"],
+)
+def test_a_law_does_not_depend_on_clock_mirror_or_units(program: dict, rounded: dict) -> None:
+    """A command of half the size on readings four times as large has an eighth of every gain; a filter keeps its time.
+
+    Powers of two, so that nothing is rounded otherwise.
+    """
+    record = closed_loop(Pid(**program), rows=2000, **rounded)
+    here = found_in(record)
+    others = {
+        1.0: (changed(record, later=1024.0), changed(record, y=-1.0, r=-1.0, u=-1.0)),
+        0.125: (changed(record, y=4.0, r=4.0, u=0.5),),
+    }
+    for times, records in others.items():
+        for other in records:
+            found = found_in(other)
+            assert (found.structure, found.quality, found.every) == (here.structure, here.quality, here.every)
+            assert (found.used == here.used).all()
+            for name, gain in here.gains.items():
+                factor = times if name.startswith("k") else 1.0
+                theirs = found.gains[name]
+                assert theirs.value == pytest.approx(factor * gain.value, rel=1e-6)
+                assert theirs.interval == pytest.approx([factor * end for end in gain.interval], rel=1e-4)

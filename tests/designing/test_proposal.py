@@ -69,7 +69,7 @@ def test_a_model_s_pace_is_that_of_its_fall_its_swing_or_its_decay(poles, pace):
 
 
 def test_what_has_no_pace_of_its_own_is_asked_for_poles():
-    with pytest.raises(BadInput, match="has no pace of its own; give either --poles"):
+    with pytest.raises(BadInput, match="has no pace of its own; give either poles"):
         up.design(([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]]), period="10 ms")
 
 

@@ -6,6 +6,7 @@ The expected numbers are those of what was put in, or are read off the log itsel
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -51,6 +52,83 @@ def test_a_wrong_sign_or_scale_is_undone(plant, fault):
     table = "drive" if doctored.channel == "u" else f"sensors.{doctored.channel}"
     cure = "sign = -1" if fault == "sign" else "scale = "
     assert finding.key.startswith(f"[{table}]\n{cure}")
+
+
+SIGNED = {"dead": "value [", "jump": "jump [", "effort": "value [1]", "spike": "largest"}
+"""Evidence that turns with the columns."""
+LATER = 1024.0
+IN_CLOCK = ("from [s]", "end [s]", "logged end [s]")
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_findings_do_not_depend_on_when_the_clock_began(plant, fault):
+    doctored, before = planted(plant, fault)
+    record = replace(doctored.record, t=doctored.record.t + LATER)
+    after = examine(record, doctored.rig, doctored.wiring).wrong
+    for here, later in zip(before, after, strict=True):
+        assert (later.kind, later.columns, later.severity) == (here.kind, here.columns, here.severity)
+        shift = {n: LATER * (n in IN_CLOCK) for n in here.evidence}
+        assert later.evidence == pytest.approx({n: v + shift[n] for n, v in here.evidence.items()}, rel=1e-6, abs=1e-9)
+        assert later.marks == pytest.approx([t + LATER for t in here.marks])
+        assert np.ravel(later.spans) == pytest.approx(np.ravel(here.spans) + LATER)
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_findings_are_those_of_the_rig_in_a_mirror(plant, fault):
+    """Equations of both rigs are odd, so a log with every sign turned is one of the same rig with the same fault."""
+    doctored, before = planted(plant, fault)
+    record = replace(doctored.record, signals={n: -x for n, x in doctored.record.signals.items()})
+    sensors = {n: replace(s, offset=-float(s.offset)) for n, s in doctored.wiring.sensors.items()}
+    after = examine(record, doctored.rig, replace(doctored.wiring, sensors=sensors)).wrong
+    for here, mirrored in zip(before, after, strict=True):
+        assert (mirrored.kind, mirrored.columns, mirrored.severity) == (here.kind, here.columns, here.severity)
+        turned = {n: -v if n.startswith(SIGNED.get(here.kind, "-")) else v for n, v in here.evidence.items()}
+        assert mirrored.evidence == pytest.approx(turned, rel=1e-6, abs=1e-9)
+        assert mirrored.spans == here.spans
+
+
+OTHER_UNITS = {"rad": (180 / math.pi, "deg"), "m": (1000.0, "mm"), "counts": (1.0, "counts")}
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_findings_do_not_depend_on_the_units_of_a_log(plant, fault):
+    """Evidence in a column's own unit is in the other one then, and so is a ratio of a column to the command."""
+    doctored, before = planted(plant, fault)
+    record, wiring = doctored.record, doctored.wiring
+    per = {n: OTHER_UNITS[unit] for n, unit in record.units.items() if unit}
+    signals = {n: per[n][0] * x if n in per else x for n, x in record.signals.items()}
+    sensors = {n: replace(s, unit=per[n][1], offset=per[n][0] * float(s.offset)) for n, s in wiring.sensors.items()}
+    record = replace(record, signals=signals, units={n: unit for n, (_, unit) in per.items()})
+    after = examine(record, doctored.rig, replace(wiring, sensors=sensors)).wrong
+    for here, other in zip(before, after, strict=True):
+        assert (other.kind, other.columns, other.severity) == (here.kind, here.columns, here.severity)
+        assert len(other.evidence) == len(here.evidence)
+        for (name, value), (theirs, found) in zip(here.evidence.items(), other.evidence.items(), strict=True):
+            own = next((unit for unit in ("rad", "m") if name.endswith(f"[{unit}]")), "")
+            times, unit = OTHER_UNITS.get(own, (1.0, ""))
+            if fault == "effort is the position" and name == "factor [1]":
+                times = 1 / per[next(iter(wiring.sensors))][0]
+            assert theirs == (name.replace(f"[{own}]", f"[{unit}]") if own else name)
+            assert found == pytest.approx(times * value, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FACTORS)
+def test_a_wrong_sign_or_scale_is_found_beside_a_spike(plant, fault):
+    """Single samples that were read wrongly spoil no equation of motion."""
+    doctored, (alone,) = planted(plant, fault)
+    column = next(n for n in doctored.wiring.sensors if n != doctored.channel)
+    x = doctored.record[column].copy()
+    x[x.size // 2] += 0.5 * np.ptp(x)
+    record = replace(doctored.record, signals={**doctored.record.signals, column: x})
+    found = {f.kind: f for f in examine(record, doctored.rig, doctored.wiring).wrong}
+    assert found.keys() == {alone.kind, "spike"}
+    assert found["spike"].columns == (column,)
+    assert found[alone.kind].columns == alone.columns
+    assert found[alone.kind].evidence["factor [1]"] == pytest.approx(alone.evidence["factor [1]"], rel=0.02)
 
 
 @pytest.mark.parametrize("plant", RIGS)

@@ -166,6 +166,7 @@ def test_the_cover_names_each_rig_once_with_the_seed_that_makes_it_again(bench, 
     facts = dict(cover.facts)
     assert facts["Rig"] == "ECP 205 + A51, Furuta pendulum (seed 4); ECP 210, two carts (seed 4)"
     assert facts["Data"] == laboratory.TWINS
+    assert cover.first_line.startswith("SIMULATED")
     assert facts["Experiments"] == "1, 2, 3"
     assert facts["Made"].startswith("2006-06-18, upright ")
     assert facts["Again"] == "upright lab --seed 4"

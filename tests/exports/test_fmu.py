@@ -143,7 +143,7 @@ def test_fmpy_s_validator_finds_nothing_and_its_simulation_agrees(tmp_path):
 )  # fmt: skip
 def test_what_has_no_counterpart_in_c_is_refused_by_its_text(line):
     """Another program than the kernel's text would be worse than none."""
-    with pytest.raises(BadInput, match="does not write as C; --to gymnasium") as refused:
+    with pytest.raises(BadInput, match="does not write as C; the target gymnasium") as refused:
         as_c(f"def run_1(n):\n    {line}\n", "run_1", {}, {})
     assert line.partition("n = ")[2].split(" ")[0] in str(refused.value)
 

@@ -120,7 +120,7 @@ def test_the_command_writes_a_model_that_mujoco_loads(tmp_path):
 def test_a_plant_of_one_s_own_is_refused_with_what_takes_it(tmp_path):
     rig = identified(tmp_path, RIGS["pendulum"])
     strange = replace(rig, plant=SPECIMENS["double pendulum"].plant)
-    with pytest.raises(BadInput, match="--to fmu"):
+    with pytest.raises(BadInput, match="the target fmu"):
         model(strange)
 
 

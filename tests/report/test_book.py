@@ -4,8 +4,10 @@ import json
 import re
 from html import unescape
 from html.parser import HTMLParser
+from io import StringIO
 
 import pytest
+from rich.console import Console
 
 from upright.errors import BadInput
 from upright.report import pdf
@@ -27,6 +29,7 @@ from upright.report.page import (
     as_plain,
     from_plain,
 )
+from upright.report.terminal import print_book
 
 HOSTILE = '<script>alert(1)</script> & "quotes" *bold* #let x = 1 $y$ \\ `raw` @ref ~ [b] // no'
 
@@ -77,6 +80,7 @@ def book():
             chapter("1a", "cart"),
             chapter("4", "disk", sound=False),
         ),
+        first_line="SIMULATED: no rig was driven.",
         notes=("Stopped by Ctrl-C.",),
         missing=(("3", "Tracking"),),
         steps=(Step("Next.", "upright lab --seed 1"),),
@@ -125,6 +129,17 @@ def test_the_cover_says_what_was_run_what_it_showed_and_what_is_missing(page):
     cover = " ".join(" ".join(Page(page[: page.index('class="chapter"')]).said).split())
     for needed in ("Verdict of 1a stands.", "with reservations", "3 Tracking", "not run", "7.9 to 8.1", "Stopped by"):
         assert needed in cover
+
+
+def test_that_no_rig_was_driven_stands_before_every_verdict(book, page, tmp_path):
+    pypdf = pytest.importorskip("pypdf")
+    pytest.importorskip("typst")
+    screen = Console(file=StringIO(), width=100)
+    print_book(screen, book)
+    paper = pypdf.PdfReader(pdf.write_pdf(tmp_path / "report.pdf", book)).pages[0].extract_text()
+    for text in (page[page.index("<main>") :], screen.file.getvalue(), paper):
+        read = " ".join(text.split())
+        assert read.index("SIMULATED") < read.index("1 of 2 experiments" if "1 of 2" in read else "Verdict of 1a")
 
 
 def test_on_paper_it_says_the_same(book, tmp_path):

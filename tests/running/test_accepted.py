@@ -69,7 +69,7 @@ def bench(tmp_path, monkeypatch):
 
 def test_such_a_law_is_not_armed(bench):
     bench(NOT_TRUSTED)
-    with pytest.raises(BadInput, match=r"not armed on hardware.*explained to 41 %.*--accept"):
+    with pytest.raises(BadInput, match=r"not armed on hardware.*explained to 41 %.*accept"):
         up.run("RIG.toml", law="design/design.json")
 
 

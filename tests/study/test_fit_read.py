@@ -50,7 +50,7 @@ def test_what_speaks_against_a_fit_is_told_before_what_holds_in_part(words, trus
 
 def test_a_fit_without_a_verdict_says_so():
     assert basis_of("", [], trusted=True).sentence == "The fit is trusted."
-    assert basis_of("", [], trusted=False).sentence == "The fit's own verdict: it is not to be trusted."
+    assert basis_of("", [], trusted=False).sentence == "The fit's own verdict: do not rely on this model yet."
     without = {k: v for k, v in FIT.items() if k != "trusted"}
     assert stored_fit(without).basis.sentence == "This fit does not say whether it can be trusted."
     assert stored_fit(without).trusted is False

@@ -58,6 +58,18 @@ def test_a_law_of_the_logs_columns_commands_in_the_drives_unit(tmp_path: Path, l
     np.testing.assert_allclose(u[3:], -0.5 * RECORD["u"][3:], atol=1e-6)
 
 
+def test_two_taps_smooth_a_difference_as_the_program_does(tmp_path: Path) -> None:
+    """``u = kp e + kd (0.2 d + 0.8 d_before)``, the differences `d` of the error; the drive halves and turns it."""
+    run = run_of(
+        tmp_path, 'loop = { kind = "pid", kp = 4, kd = 0.1, taps = [0.2, 0.8], reference = "r", units = "log" }'
+    )
+    u, _ = run.loop.follow(run.y, run.measured)
+    e = RECORD["r"] - RECORD["y"]
+    d = np.diff(e, prepend=e[0]) / T
+    expected = 4 * e + 0.1 * (0.2 * d + 0.8 * np.concatenate([[0.0], d[:-1]]))
+    np.testing.assert_allclose(u[3:], -0.5 * expected[3:], atol=1e-6)
+
+
 def test_a_recovered_law_is_told_with_the_run(tmp_path: Path) -> None:
     assert "loop recovered from the log: PID; filtered difference of the error" in run_of(tmp_path, RECOVER).source
 

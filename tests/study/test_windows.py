@@ -30,6 +30,13 @@ def test_windows_are_told_with_their_share_of_the_record(parts, sentence):
     assert window_sentence(parts, 0.0, 50.0) == sentence
 
 
+def test_instants_of_a_late_clock_are_told_apart():
+    """A clock that counts from midnight: four digits of 50 000 s would be ten seconds."""
+    assert window_sentence([("fit", 50_000.3, 50_049.8)], 50_000.0, 50_050.0) == (
+        "Fits 50000.3 to 50049.8 s, 99 % of the record."
+    )
+
+
 def part_of(file, role, first, last, record):
     """A run that is a part of a log, whose source has the log's hash and what was done to it behind the name."""
     return SimpleNamespace(

@@ -68,7 +68,7 @@ def test_a_file_that_holds_no_law_is_refused(content, said, tmp_path):
 
 
 def test_a_limit_is_for_forms_that_take_one(tmp_path):
-    with pytest.raises(BadInput, match="the limit is that of the fit; --limit is for --to gymnasium"):
+    with pytest.raises(BadInput, match="the limit is that of the fit; limit is for gymnasium"):
         up.export(up.Pendulum(m_p=0.2, l_cg=0.2), to="mjcf", limit=1.0, out=tmp_path)
     with pytest.raises(BadInput, match="an environment draws its rigs from a fit"):
         up.export(up.Pendulum(m_p=0.2, l_cg=0.2), to="gymnasium", limit=1.0, out=tmp_path)

@@ -50,7 +50,7 @@ def test_arrays_without_a_period_are_a_model_at_its_samples():
         (lambda: up.prefilter(MODEL, [1, 2], output=-1), "output is a number from 0 to 1 or one of"),
         (lambda: up.place(MODEL, [object()]), "poles are complex numbers, or a text"),
         (lambda: up.dlqr(up.Pendulum(m_p=0.2, l_cg=0.2).linear(), [1, 1], 1.0), "this one is continuous"),
-        (lambda: up.identify("a.toml", method="guess"), "--method must be one of"),
+        (lambda: up.identify("a.toml", method="guess"), "method must be one of"),
         (lambda: up.identify(up.Pendulum(m_p=0.2, l_cg=0.2, J_p=1e-3)), "takes a log of it first"),
         (lambda: up.identify(RECORD, 3), r"takes a plant such as up\.Pendulum"),
         (lambda: up.identify("a.toml", up.Pendulum), "plant belongs to a log"),
@@ -74,7 +74,7 @@ PRINTED = "concept,pre,post\nfeedback,2,3\n"
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"n": 1}, "at least 2, got 1"), ({}, "say with --n how many answers"),
+        ({"n": 1}, "at least 2, got 1"), ({}, "say with n how many answers"),
         ({"n": 9, "scale": "4-4"}, "its two ends"),
         ({"n": 9, "scale": "1"}, "its two ends"), ({"n": 9, "scale": "1-1000"}, "its two ends"),
     ],
@@ -95,7 +95,7 @@ def test_a_survey_of_two_answers_and_a_scale_in_words_is_read(tmp_path):
 
 def test_a_file_is_no_folder_for_a_laboratory(tmp_path):
     (tmp_path / "out").write_text("mine", encoding="utf-8")
-    with pytest.raises(BadInput, match="out is a file; name another with -o"):
+    with pytest.raises(BadInput, match="out is a file; name another with out"):
         up.lab(out=tmp_path / "out")
 
 

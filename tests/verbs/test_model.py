@@ -51,9 +51,9 @@ def test_a_plan_is_as_exact_as_a_straight_line_can_be():
 @pytest.mark.parametrize(
     ("call", "sentence"),
     [
-        (lambda: plan_inertias(rig="furuta"), "--rig is"),
-        (lambda: plan_inertias(radius=0.04), "--radius is for disks"),
-        (lambda: plan_inertias(runs=2, levels=3), "at least as many as --levels"),
+        (lambda: plan_inertias(rig="furuta"), "rig is"),
+        (lambda: plan_inertias(radius=0.04), "radius is for disks"),
+        (lambda: plan_inertias(runs=2, levels=3), "at least as many as levels"),
         (lambda: plan_inertias(runs=40), "from 2 to 16"),
         (lambda: plan_inertias(error=0.6), "between 0 and 50 %"),
         (lambda: frequency(ask="noise"), "sines, multisine, sweep"),

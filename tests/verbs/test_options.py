@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from inspect import signature
+from inspect import signature, unwrap
 
 import pytest
 import typer
@@ -25,6 +25,7 @@ def command(name: str):
 def names(verb) -> set[str]:
     """Names by which a verb can be called, those that it shares with others among them."""
     out: set[str] = set()
+    verb = unwrap(verb)
     for p in signature(verb).parameters.values():
         out |= shared_parameters(p, verb.__module__)[0].keys() if p.kind is p.VAR_KEYWORD else {p.name}
     return out

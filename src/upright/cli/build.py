@@ -20,7 +20,6 @@ from upright.verbs.values import pairs
 SETTINGS = {"help_option_names": ["-h", "--help"]}
 INTERRUPTED, WRONG = 130, 3
 # What options of one name have in common, whichever command they are of.
-NAMES = {"out": "-o --out"}
 METAVARS = {
     "command": "COLUMN", "counts": "LIST", "data": "DIR", "limit": "U", "log": "LOG",
     "logs": "LOG...", "out": "DIR", "period": "TIME", "poles": "LIST", "reader": "NAME", "travel": "M_OR_RAD",
@@ -71,7 +70,7 @@ def build(command: Command) -> Any:
 def _option(command: Command, parameter: inspect.Parameter, texts: Mapping[str, str]) -> inspect.Parameter:
     """A parameter of the verb as one that Typer reads."""
     name, default = parameter.name, command.defaults.get(parameter.name, parameter.default)
-    kind, named = _kind(parameter), command.names.get(name, NAMES.get(name, "")).split()
+    kind, named = _kind(parameter), command.options(name)
     if _repeated(parameter):
         kind, default = list[kind], parameter.empty if default is parameter.empty else None
     elif kind is Path and isinstance(default, str):

@@ -174,7 +174,7 @@ def column_unit(c: Column) -> str:
 
 
 def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
-    """Rig, or kind of plant, and wiring by a plant's name, a study (TOML) or a ``fit.json``.
+    """Rig, or kind of plant, and wiring by a plant's name, a study (TOML), a ``fit.json`` or an MJCF file.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
         When it is none of these.
     """
     path = Path(text)
-    if path.suffix == ".json" or (path.is_dir() and (path / "fit.json").is_file()):
+    if path.suffix in (".json", ".xml") or (path.is_dir() and (path / "fit.json").is_file()):
         return replace(read_stored_rig(path, draws=0), name=text), Wiring()
     if path.suffix == ".toml":
         return _study(path, log)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from upright._version import __version__
+from upright.basis import SIMULATED
 from upright.errors import BadInput, UprightError
 from upright.experiments.nonideal import nonideal as nonideal_twin
 from upright.experiments.parallel import run_parallel
@@ -393,7 +394,7 @@ def book(session: Session, day: date) -> Book:
         chapters=tuple(
             replace(t.chapter, about=t.rig, finished=t.state in ("done", "kept")) for t in session.results
         ),
-        notes=tuple(notes),
+        first_line=SIMULATED if live is None else live.performed, notes=tuple(notes),
         missing=tuple((e.name, e.title) for e in session.missing),
         steps=next_steps(session), sources=(PAPER,),
     )  # fmt: skip

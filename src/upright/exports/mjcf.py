@@ -99,7 +99,7 @@ def _chained(p: Any, v: Mapping[str, float], name: str) -> tuple[str, str, tuple
     n = len(p.coordinates)
     kind = next((k for k in ("rectilinear", "torsional") if n <= 9 and type(p) is chain(n, k)), "")
     if not kind:
-        raise BadInput(f"the bodies of a '{name}' are not known, only its equations; --to fmu takes any plant.")
+        raise BadInput(f"the bodies of a '{name}' are not known, only its equations; the target fmu takes any plant.")
     letter, axis, joint = ("m", "1 0 0", "slide") if kind == "rectilinear" else ("J", "0 0 1", "hinge")
     bodies, tendons = "", ""
     for i, c in enumerate(p.coordinates, start=1):

@@ -172,5 +172,6 @@ class _Plain(ast.NodeTransformer):
 def _refusal(node: ast.AST) -> BadInput:
     return BadInput(
         f"the rule holds '{ast.unparse(node).splitlines()[0][:80]}', which this program does not write as C: it takes "
-        "numbers, given tuples by index, if, for and while, and returns (commands,), (memory,); or take --to python."
+        "numbers, given tuples by index, if, for and while, and returns (commands,), (memory,); "
+        "or take the target python."
     )

@@ -49,6 +49,8 @@ def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = (), tit
 
 def print_book(screen: Any, book: Book, files: Sequence[Path] = ()) -> None:
     """Print verdict and numbers of every chapter, which files hold the rest, and what next."""
+    if book.first_line:
+        screen.print(book.first_line, style="bold", soft_wrap=not screen.is_terminal, markup=False)
     for chapter in book.chapters:
         screen.print(
             f"Experiment {chapter.key}, {chapter.title} ({chapter.about})",

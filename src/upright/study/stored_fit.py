@@ -229,7 +229,7 @@ def basis_of(verdict: str, answers: Sequence[Judgement], *, trusted: bool) -> Ba
     """A fit's own verdict for what rests on it: what speaks against it, else what was not tested or holds in part."""
     against = [a for a in answers if a.answer == "no"]
     if not trusted:
-        reason = _worded(against[0]) if against else verdict or "it is not to be trusted."
+        reason = _worded(against[0]) if against else verdict or "do not rely on this model yet."
         return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {reason}")
     less = [*against, *(a for a in answers if a.answer in ("in part", "not tested"))]
     if less:

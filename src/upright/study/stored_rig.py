@@ -1,4 +1,4 @@
-"""The rig that a file tells of: a fit.json, or a study with its guesses; or a plant's numbers alone."""
+"""The rig that a file describes: a fit.json, an MJCF file, or a study with its guesses; or a plant's numbers alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from upright.study.text import StudyText
 
 
 def read_stored_rig(path: Path, *, seed: int = 0, draws: int = 200) -> Rig:
-    """Rig of a `fit.json` (or the folder that holds it), or of a study, whose guesses then count as its numbers.
+    """Rig of a `fit.json` (or its folder), of an MJCF file (.xml), or of a study, whose guesses count as its numbers.
 
     Raises
     ------
@@ -25,7 +25,11 @@ def read_stored_rig(path: Path, *, seed: int = 0, draws: int = 200) -> Rig:
     """
     path = path / "fit.json" if path.is_dir() else path
     if not path.exists():
-        raise BadInput(f"{path} does not exist; name the fit.json of `upright identify`, or a study with its numbers.")
+        raise BadInput(f"{path} does not exist; name the fit.json of `upright identify`, a study or an MJCF file.")
+    if path.suffix.lower() == ".xml":
+        from upright.rig.mjcf import read_mjcf
+
+        return read_mjcf(path).rig
     return read_fit(path).rig(seed=seed, draws=draws) if path.suffix == ".json" else _from_study(path)
 
 

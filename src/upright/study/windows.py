@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 from upright.identification.model.runs import Run
@@ -32,8 +33,9 @@ def window_sentence(parts: Iterable[Part], first: float, last: float) -> str:
     """What is fitted and predicted of a record from `first` to `last` [s], and which share of it that is."""
     parts = sorted(parts, key=lambda part: part[1])
     clauses: list[str] = []
+    digits = digits_within(4, first, last)
     for role in dict.fromkeys(role for role, _, _ in parts):
-        spans = ", ".join(f"{start:.4g} to {stop:.4g}" for own, start, stop in parts if own == role)
+        spans = ", ".join(f"{start:.{digits}g} to {stop:.{digits}g}" for own, start, stop in parts if own == role)
         clauses.append(f"{VERBS[role]} {spans} s")
     covered, reached = 0.0, first
     for _, start, stop in parts:
@@ -42,3 +44,9 @@ def window_sentence(parts: Iterable[Part], first: float, last: float) -> str:
     share = 100 * covered / (last - first) if last > first else 100.0
     text = " and ".join(clauses)
     return f"{text[0].upper()}{text[1:]}, {share:.{0 if share >= 1 else 1}f} % of the record."
+
+
+def digits_within(digits: int, first: float, last: float) -> int:
+    """Digits that tell instants from `first` to `last` [s] apart as `digits` do on a clock that begins at zero."""
+    largest, span = max(abs(first), abs(last)), last - first
+    return digits + max(0, math.ceil(math.log10(largest / span) - 1e-9)) if 0 < span < largest else digits

@@ -10,6 +10,9 @@ from typing import Any, TypeVar
 
 V = TypeVar("V", bound=Callable[..., Any])
 
+NAMES = {"out": "-o --out"}
+"""Options that are not called after their parameter alone, whichever command they are of."""
+
 _SECTION = re.compile(r"\n\n(\w+)\n-{3,}\n")
 
 
@@ -74,6 +77,10 @@ class Command:
     def words(self) -> str:
         """What is typed after ``upright``."""
         return self.name or self.verb.__name__.replace("_", "-")
+
+    def options(self, name: str) -> list[str]:
+        """What is typed for a parameter, where it is not called after it."""
+        return self.names.get(name, NAMES.get(name, "")).split()
 
     @property
     def line(self) -> str:

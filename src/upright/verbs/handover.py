@@ -23,7 +23,7 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     Parameters
     ----------
     source : path, Fit, Study, Plant or Rig
-        A path is that of a fit.json, of its folder, or of a study.
+        A path is that of a fit.json, of its folder, of a study, or of an MJCF file.
     verb : str
         Who asks, for the sentence.
     seed, draws : int
@@ -93,6 +93,6 @@ def _file(source: Any, verb: str) -> Path:
     if isinstance(source, type):
         raise BadInput(f"{verb} needs numbers: {source.__name__}(...), or what up.identify answered.")
     raise BadInput(
-        f"{verb} takes what up.identify answered, a fit.json or its folder, a study, a rig or a plant with numbers, "
-        f"got {type(source).__name__}."
+        f"{verb} takes what up.identify answered, a fit.json or its folder, a study, an MJCF file, a rig or a plant "
+        f"with numbers, got {type(source).__name__}."
     )

@@ -307,7 +307,7 @@ def init(
     time_unit: str | None = None,
     force: bool = False,
 ) -> Answer[str]:  # fmt: skip
-    """Write a commented study file from a log, filled in with what could be recognised.
+    """Write a commented study file from a log, filled in with what could be recognised; or from a MuJoCo model (.xml).
 
     It guesses the plant, which columns measure and which one drives, units, encoder counts, rest levels, the sign of
     the drive, the window in which something happens, and where to start each parameter. For a pendulum let go from some
@@ -316,7 +316,7 @@ def init(
     Parameters
     ----------
     log : path, Record or pandas.DataFrame
-        Log of a rig: CSV, MATLAB, ECP export, ROS bag as CSV.
+        Log of a rig: CSV, MATLAB, ECP export, ROS bag as CSV; or its MJCF, ending in .xml.
     out : path, optional
         Study to write, or a folder for LOG.toml; the draft is only answered when omitted. A log that is no file is
         written beside the study, as CSV, for the study to name.
@@ -343,6 +343,8 @@ def init(
     from upright.report.symbols import typed
 
     path = _file(log)
+    if path is not None and path.suffix.lower() == ".xml":
+        return _init_from_mjcf(path, out, force)
     record = None
     if path is None:
         record, path = open_log(log)
@@ -390,6 +392,30 @@ def init(
     return Answer(
         text, Chapter(title=f"Draft of {study.name}", verdict="", parts=parts, steps=(onward,), numbers=numbers), files
     )
+
+
+def _init_from_mjcf(path: Path, out: str | os.PathLike[str] | None, force: bool) -> Answer[str]:
+    """Study of the rig that an MJCF file describes."""
+    from upright.report.page import Chapter, Part, Points, Step
+    from upright.report.symbols import typed
+    from upright.rig.mjcf import read_mjcf
+    from upright.study.mjcf import study_of_mjcf
+
+    study = Path(f"{path.stem}.toml") if out is None else Path(out)
+    study = study / f"{path.stem}.toml" if study.is_dir() else study
+    if out is not None and study.exists() and not force:
+        raise BadInput(f"{study} exists already; name another file with -o, or replace it with --force")
+    read = read_mjcf(path)
+    text = study_of_mjcf(read, path.name)
+    files = [] if out is None else [replace_file(study, text.encode())]
+    limit = "" if "limit" in read.rig.hardware.entries else " --limit 10"
+    see = f'upright play {typed(study)}{limit} --period "2 ms" --counts 4096'
+    page = Chapter(
+        title=f"Rig of {path.name}", verdict="", numbers={"study": text},
+        parts=(Part("Recognised", (Points((read.coordinates, *read.left_out)),)),),
+        steps=(Step("See it move, with your servo period and encoders.", f"{see} -o play.html"),),
+    )  # fmt: skip
+    return Answer(text, page, files)
 
 
 @command(

@@ -110,7 +110,8 @@ def _(plant: Plant) -> Chapter:
 @summary.register
 def _(rig: Rig) -> Chapter:
     plant = summary(rig.plant)
-    per = f"{rig.plant.inputs[0].unit}/{rig.unit}" if rig.plant.inputs and rig.unit else ""
+    force = rig.plant.inputs[0].unit if rig.plant.inputs else ""
+    per = force if rig.unit == "1" else f"{force}/{rig.unit}" if force and rig.unit else ""
     allowed = f"; {len(rig.draws)} rigs drawn from its covariance" if rig.draws else ""
     return Chapter(
         title=rig.name, parts=(*plant.parts, Part("", (rig_table(rig),))),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.physics import CartPendulum, Furuta
+from upright.physics import BUILT_IN, CartPendulum, Furuta, find
 from upright.readers import inspect
 from upright.readers.inspection import Column, Inspection
 from upright.readers.resolution import Resolution
@@ -21,6 +21,7 @@ from upright.study.draft.recognise import (
     in_dac_counts,
     moves_against,
     moving_window,
+    named_after,
     plant_of,
     position_columns,
     recognise,
@@ -481,3 +482,14 @@ def test_a_log_in_which_nothing_moves_names_its_file_and_what_to_look_at():
     record = log(alpha=0 * T)
     with pytest.raises(BadInput, match="no column moves like an angle, a position or a count; `upright show`"):
         recognise(record, inspect(record))
+
+
+@pytest.mark.parametrize("plant", BUILT_IN)
+def test_columns_are_named_after_the_one_plant_on_a_driven_body_that_has_just_these_coordinates(plant):
+    """Carts, disks and links share their names with each other, a single angle is called theta by everybody."""
+    own = [c.name for c in find(plant).coordinates]
+    named = plant if plant in ("cart-pendulum", "furuta") else ""
+    assert named_after([col(name) for name in own]) == named
+    assert named_after([col(f"{name} (rad)") for name in reversed(own)]) == named
+    assert named_after([col(name) for name in (*own, "delta")]) == ""
+    assert named_after([col(name) for name in own[:1]]) == ""

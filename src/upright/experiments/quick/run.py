@@ -15,6 +15,7 @@ from upright.control.sensors import SURE
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import SUBSTEPS
 from upright.control.wiring import WiringCheck, check_wiring
+from upright.errors import BadInput
 from upright.experiments.stand.fits import fit_study
 from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import APPLIED, file_of
@@ -37,8 +38,6 @@ UP = 14.0
 """Time for the way up and for holding [s]."""
 HELD = 3.0
 """How long it must stand at the end to be called upright [s]."""
-OF_TRAVEL = 0.8
-"""Share of the travel at which the law itself switches off, so that the body coasts within it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,7 +129,10 @@ def run_quick(
     known = read_stored_rig(folder / "fit.json", seed=seed)
     model = completed(known, vendor=stand.vendor, who="a minute at a rig", form="").replace(name=stand.rig.name)
     progress("designing", 0.8)
-    law = design_swing_up(model, travel=OF_TRAVEL * stand.travel)
+    try:
+        law = design_swing_up(model, travel=stand.travel, speeds=stand.speeds, seed=seed)
+    except BadInput as error:
+        return replace(result, study=study, fit=fit, model=model, refused=str(error).rstrip("."))
     share = caught(model, law, seed)
     result = replace(result, study=study, fit=fit, model=model, law=law, share=share)
     if share < ENOUGH:

@@ -222,7 +222,7 @@ def live_stand(
     return LiveStand(
         file=file, rig=rig, true_rig=replace(truth, name=rig.name), make=_make(file), vendor=file.vendor,
         performed=file.performed, zero=file.zero, room=limits.travel[list(units).index(rig.plant.inputs[0].on)],
-        fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
+        speeds=limits.speed, fit=fit, study=None if fit else file.known, added=file.added, tolerance=file.tolerance,
         person=person if file.hardware else nobody, watching=watching, accept=accept,
     )  # fmt: skip
 

@@ -58,6 +58,9 @@ class TestStand(ABC):
         Equilibrium at which the encoders are zeroed; the plant's first when omitted, or where it has no such.
     room : float
         How far the driven coordinate may go [m or rad], where that is less than the rig itself says.
+    speeds : tuple of float
+        Limits of the coordinates' speeds [rad/s or m/s], beyond which a run is stopped; empty where only the rig itself
+        says one.
     fit : Path or None
         What describes it already, so that nothing of it is left to identify.
     study : Path or None
@@ -77,6 +80,7 @@ class TestStand(ABC):
     performed: str = SIMULATED
     zero: str | None = None
     room: float = math.inf
+    speeds: tuple[float, ...] = ()
     fit: Path | None = None
     study: Path | None = None
     added: tuple[str, ...] = ()

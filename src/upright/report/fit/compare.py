@@ -47,7 +47,6 @@ class Comparison:
 
     Attributes
     ----------
-    runs : mapping of str to ComparedRun
     parameters : mapping of str to (mapping of str to Estimate)
         By fit and name.
     agree : mapping of str to (mapping of str to ParameterAgreement)
@@ -87,7 +86,7 @@ def chapter(compared: Comparison, *, command: str) -> Chapter:
               and run.worst(BLACK_BOX) > run.worst(best)]  # fmt: skip
     doubted = [who for who, trusted in compared.trusted.items() if not trusted]
     warnings = [
-        *(f"{who} is not to be trusted by its own verdict." for who in doubted),
+        *(f"Do not rely on {who} yet: that is its own verdict." for who in doubted),
         *(
             f"'{label}' was fitted by {', '.join(run.fitted_by)}: what these reach there is no prediction."
             for label, run in compared.runs.items()

@@ -13,6 +13,7 @@ from upright.records import Record
 from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.recognise import in_dac_counts
 from upright.study.text import TomlTable, Value
+from upright.study.windows import digits_within
 
 PLACES = (*ANGLES, *LENGTHS)
 EFFORTS = ("V", "A", "N", "N m")
@@ -116,7 +117,7 @@ def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list
         table = TomlTable("[[runs]]")
         table.key("label", label)
         table.key("file", file)
-        table.key("window", [start, stop], "s", digits=5)
+        table.key("window", [start, stop], "s", digits=digits_within(5, start, stop))
         table.key("role", role, ROLES[role])
         tables.append(table)
     return tables

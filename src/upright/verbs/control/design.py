@@ -142,7 +142,7 @@ def design(
             raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
         loop = completed(
             rig, rig_entries(rig.plant, rig.unit, on), vendor=on.get("vendor"),
-            needs=("servo_period", "counts"), who="upright design",
+            needs=("servo_period", "counts"), who="design",
         )  # fmt: skip
         request = replace(
             request, at=here, period=loop.period, speed=speed, resolution=tuple(loop.resolution.tolist()),

@@ -108,7 +108,7 @@ def track(
         known = rig_of(source, "track")
         shaft_make(known.plant, f"'{known.name}'")
         entries, vendor = rig_entries(known.plant, known.unit, options), options.get("vendor")
-        model = rig_of_file(completed(known, entries, vendor=vendor, who="upright track"), Path(called(source)).name)
+        model = rig_of_file(completed(known, entries, vendor=vendor, who="track"), Path(called(source)).name)
         doubt = doubts(known, model)
     size = si_if_given(step, model.plant.coordinates[-1].unit)
     if size is not None and not size > 0:

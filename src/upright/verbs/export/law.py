@@ -44,7 +44,7 @@ def controller_of(source: Any) -> tuple[SampledController, str]:
         *forms, last = (t.name for t in TARGETS.own.values() if isinstance(t, RigTarget))
         raise BadInput(
             f"{path} is a fit, and a law is what `upright design {path} --poles ... -o FOLDER` makes of it; the rig "
-            f"itself goes --to {', '.join(forms)} or {last}."
+            f"itself goes to {', '.join(forms)} or {last}."
         )
     return _of_content(content, str(path))
 
@@ -68,7 +68,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
     if isinstance(made.law, Rule) and (single or not target.rules):
         of_rules = (t.name for t in TARGETS.own.values() if isinstance(t, LawTarget) and t.rules)
         raise BadInput(
-            f"a rule goes --to {', '.join(of_rules)} in double precision, since it is not known what it makes of a "
+            f"a rule goes to {', '.join(of_rules)} in double precision, since it is not known what it makes of a "
             f"rounding; got {'--float' if single else target.name}."
         )
     test = self_test(made)

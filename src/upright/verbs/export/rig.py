@@ -23,7 +23,7 @@ def write_rig(source: Any, target: RigTarget, at: Path, limit: float | None) -> 
 
     if limit is not None and not target.limited:
         ours = (t for t in TARGETS.own.values() if isinstance(t, RigTarget) and t.limited)
-        raise BadInput(f"the limit is that of the fit; --limit is for --to {', '.join(t.name for t in ours)}.")
+        raise BadInput(f"the limit is that of the fit; --limit is for {', '.join(t.name for t in ours)}.")
     rig = rig_of(source, "export", draws=target.draws)
     export = RigExport(rig=rig, called=called(source), folder=at, store=lambda: _saved(source, at), limit=limit)
     contents, page = target.write(export)

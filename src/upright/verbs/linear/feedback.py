@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput, nearest
 from upright.laws import Law
 from upright.physics import Plant
+from upright.renamed import outside
 from upright.shown import Shown
 from upright.systems import LinearForm, StateSpace
 
@@ -111,7 +112,7 @@ def _model_first(verb: Callable[P, R]) -> Callable[P, R]:
         if len(args) > 1 and isinstance(args[0], list | np.ndarray):
             warnings.warn(
                 f"{name}(A, B, ...) is going: put the matrices into one argument, {name}((A, B), ...).",
-                DeprecationWarning, stacklevel=2,
+                DeprecationWarning, stacklevel=outside(),
             )  # fmt: skip
             args = ((args[0], args[1]), *args[2:])
         try:

@@ -267,7 +267,7 @@ def _what_moves(plant: Any, verb: str) -> type[Plant] | Rig | None:
         return Rig(plant=plant)
     if isinstance(plant, str | Path):
         path = Path(plant)
-        return read_stored_rig(path) if path.suffix in (".json", ".toml") or path.is_dir() else find(str(plant))
+        return read_stored_rig(path) if path.suffix in (".json", ".toml", ".xml") or path.is_dir() else find(str(plant))
     if not (isinstance(plant, type) and issubclass(plant, Plant)):
         raise BadInput(
             f"{verb} takes a plant such as up.Pendulum, its name, or a rig or fit, got {type(plant).__name__}."

@@ -1,0 +1,209 @@
+"""A chapter's words: a Markdown template beside the code that computes its numbers, and the pictures that it places.
+
+A template is Jinja's over Markdown as far as a chapter has it::
+
+    # Title
+
+    > Question
+
+    Verdict, the first paragraph.
+
+    Detail, the others.
+
+    ## Part {folded}
+
+    A paragraph.
+
+    - points
+
+    | | column | number | state |
+    |---|---|--:|:-:|
+    | *k_1* [N/m] | text | 1.0 | kept |
+    : caption
+
+    ![what it shows, for who cannot see it](name) caption
+
+    [name]
+
+    ## Next
+
+    - What to do. `command`
+
+``*name* [unit]`` in a cell is a `Symbol`, a column in the middle (``:-:``) holds badges; ``![...](name)`` draws a
+picture, ``[name]`` sets blocks and ``## [name]`` whole parts that the code hands over.
+A name that the template misspells is an error.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from upright.basis import in_percent
+from upright.report.page import Block, Chapter, Code, Part, Picture, Points, Step, Symbol, Table
+from upright.report.symbols import number, percent, plain, typed, unit
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_PARAGRAPH = re.compile(r"\n\s*\n")
+_BLANK = re.compile(r"[ \n]+")
+_SYMBOL = re.compile(r"\*([^*]+)\*(.*)", re.S)
+_CELL = re.compile(r"(?<!\\)\|")
+_PICTURE = re.compile(r"!\[(.*?)\]\(([\w-]+)\)\s*(.*)", re.S)
+_PLACED = re.compile(r"\[(\w+)\]")
+_PART = re.compile(r"(.*?)(?: \{(\w+)\})?")
+_STEP = re.compile(r"(.*?)(?: `(.*)`)?", re.S)
+
+Placed = Mapping[str, Sequence[Block | Part]]
+
+
+def chapter_of(
+    module: str, *, template: str = "", figures: Mapping[str, Callable[[], Any]] | None = None,
+    placed: Placed | None = None, **values: Any,
+) -> Chapter:  # fmt: skip
+    """The template beside a module as a chapter: title, question, verdict, detail, parts and what to do next.
+
+    Parameters
+    ----------
+    module : str
+        Its ``__name__``.
+    template : str
+        Name of the template without its ending; the module's own when empty.
+    figures : mapping of str to callable, optional
+        Draws each picture that the template places.
+    placed : mapping of str to sequence of Block or Part, optional
+        What the template sets by ``[name]`` and ``## [name]``.
+    **values
+        What the template computes its sentences from.
+
+    Raises
+    ------
+    jinja2.UndefinedError
+        When the template names what there is not.
+    KeyError
+        When it places a picture or a block that was not handed over.
+    """
+    package, _, own = module.rpartition(".")
+    text = templates_of(package).get_template(f"{template or own}.md").render(**values)
+    head, *sections = re.split(r"^## ", text, flags=re.M)
+    title, question, texts = "", "", list[str]()
+    for paragraph in _paragraphs(head):
+        if paragraph.startswith("# "):
+            title = _line(paragraph[2:])
+        elif paragraph.startswith("> "):
+            question = _line(paragraph[2:].replace("\n>", "\n"))
+        else:
+            texts.append(_line(paragraph))
+    parts, steps = list[Part](), tuple[Step, ...]()
+    for section in sections:
+        heading, _, body = section.partition("\n")
+        if heading.strip() == "Next":
+            steps = tuple(_step(s) for p in _paragraphs(body) for s in _items(p))
+        elif named := _PLACED.fullmatch(heading.strip()):
+            parts += [p for p in (placed or {})[named[1]] if isinstance(p, Part)]
+        else:
+            parts.append(_part(heading.strip(), body, figures or {}, placed or {}))
+    return Chapter(
+        title=title, question=question, verdict=texts[0] if texts else "", detail=" ".join(texts[1:]),
+        parts=tuple(p for p in parts if p.content), steps=steps,
+    )  # fmt: skip
+
+
+@cache
+def templates_of(package: str) -> Environment:
+    """The templates beside the modules of a package, with the program's ways to write numbers as filters."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    templates = Environment(
+        loader=PackageLoader(package, "."), undefined=StrictUndefined, finalize=_cell, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    templates.filters.update({
+        "number": number, "percent": percent, "symbol": plain, "typed": typed, "unit": unit, "fmt": format,
+        "degrees": math.degrees, "in_percent": in_percent, "parameter": Symbol, "sentence": _sentence,
+    })  # fmt: skip
+    templates.tests.update({"finite": math.isfinite})
+    return templates
+
+
+def _sentence(clause: str) -> str:
+    """A clause with a capital letter and a full stop."""
+    return f"{clause[:1].upper()}{clause[1:]}{'' if clause[-1:] in '.!?' else '.'}"
+
+
+def _cell(value: Any) -> Any:
+    """A value as it stands in Markdown, where bars would part cells and blank lines paragraphs; ``| safe`` may."""
+    from markupsafe import Markup
+
+    if isinstance(value, Symbol):
+        name, rest = value.divided()
+        return f"*{name}*{rest}"
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return _BLANK.sub(" ", value.replace("|", r"\|"))
+    return value
+
+
+def _line(text: str) -> str:
+    """A text on one line, its bars as they were."""
+    return _BLANK.sub(" ", text).strip().replace(r"\|", "|")
+
+
+def _paragraphs(text: str) -> list[str]:
+    return [p.strip() for p in _PARAGRAPH.split(text) if p.strip()]
+
+
+def _items(text: str) -> list[str]:
+    """The points of a list."""
+    return [_line(item) for item in re.split(r"^- ", text, flags=re.M) if item.strip()]
+
+
+def _step(text: str) -> Step:
+    match = _STEP.fullmatch(text)
+    assert match is not None  # as anything is a sentence
+    return Step(match[1], match[2] or "")
+
+
+def _part(heading: str, body: str, figures: Mapping[str, Callable[[], Any]], placed: Placed) -> Part:
+    match = _PART.fullmatch(heading)
+    assert match is not None
+    content: list[Block] = []
+    for paragraph in _paragraphs(body):
+        named = _PLACED.fullmatch(paragraph)
+        new = placed[named[1]] if named else (_block(paragraph, figures),)
+        content += [b for b in new if not isinstance(b, Part)]
+    return Part(match[1], tuple(content), folded=match[2] == "folded", aside=match[2] == "aside")
+
+
+def _block(text: str, figures: Mapping[str, Callable[[], Any]]) -> Block:
+    if text.startswith("|"):
+        return _table(text)
+    if text.startswith("- "):
+        return Points(tuple(_items(text)))
+    if text.startswith("```"):
+        return Code(text.strip("`\n"))
+    if match := _PICTURE.fullmatch(text):
+        name = match[2]
+        return Picture(name=name, draw=figures[name], caption=_line(match[3]), description=_line(match[1]))
+    return _line(text)
+
+
+def _table(text: str) -> Table:
+    rows, _, caption = text.partition("\n: ")
+    headings, rule, *cells = (_cells(row) for row in rows.splitlines())
+    for row in cells:
+        if len(row) != len(headings):
+            raise ValueError(f"a row of {len(row)} cells in a table of {len(headings)} columns: {' | '.join(row)}")
+    badges = [i for i, r in enumerate(rule) if r.startswith(":")]
+    return Table(
+        caption=_line(caption), headings=headings, rows=tuple(cells), badge=badges[0] if badges else None,
+        numbers=tuple(i for i, r in enumerate(rule) if r.endswith(":") and i not in badges),
+    )  # fmt: skip
+
+
+def _cells(row: str) -> tuple[str, ...]:
+    cells = (_line(c) for c in _CELL.split(row.strip())[1:-1])
+    return tuple(Symbol(m[1] + m[2]) if (m := _SYMBOL.fullmatch(c)) else c for c in cells)

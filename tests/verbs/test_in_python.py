@@ -1,0 +1,56 @@
+"""Does a sentence name what its reader can type: arguments in Python, options at the command line?"""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+
+import numpy as np
+import pytest
+
+import upright as up
+from upright.errors import BadInput
+from upright.verbs.command import Command
+from upright.verbs.in_python import worded
+
+A, B = np.array([[0.0, 1.0], [4.0, 0.0]]), np.array([[0.0], [1.0]])
+
+
+def test_python_is_told_arguments_and_the_command_line_options():
+    from upright.verbs.control.design import design
+
+    with pytest.raises(BadInput, match='period="2 ms"') as told:
+        up.design((A, B), poles=[-4, -5])
+    assert "--" not in str(told.value)
+    with pytest.raises(BadInput, match='--period "2 ms"'):
+        design((A, B), poles=[-4, -5])
+
+
+def test_an_option_called_otherwise_than_its_argument_is_told_by_the_argument():
+    with pytest.raises(BadInput, match="which is 1 to 4, or all, got 'nine'"):
+        up.regulate(up.Furuta(m_p=0.1, l_cg=0.2, r=0.2, J_d=0.01, J_p=1e-4), which="nine", limit=5, period=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("sentence", "python"),
+    [
+        ("give one with --effort-weight 2, please.", "give one with effort_weight=2, please."),
+        ("choose another place with -o.", "choose another place with out."),
+        ("print it with `upright log show -o x`.", "print it with `upright log show -o x`."),
+        ("type upright lab --quick, or leave --quick out.", "type upright lab --quick, or leave quick out."),
+        ("poles such as -4+-2j, -1--2 and x-y stay", "poles such as -4+-2j, -1--2 and x-y stay"),
+        ("it hung upright here", "it hung upright here"),
+        ("replace it with --force", "replace it with --force"),
+    ],
+)  # fmt: skip
+def test_an_option_becomes_an_argument_and_what_is_none_stays(sentence, python):
+    command = Command(verb=up.design, flags={"force": None})
+    assert worded(sentence, command) == python
+
+
+def test_a_verb_keeps_its_signature_and_can_be_sent_to_another_process():
+    from upright.verbs.model.identify import identify
+
+    assert inspect.signature(up.identify) == inspect.signature(identify)
+    assert up.identify.__doc__ == identify.__doc__
+    assert pickle.loads(pickle.dumps(up.identify)) is up.identify
