@@ -25,8 +25,6 @@ class Checkup:
 
     Attributes
     ----------
-    name : str
-    findings : tuple of CheckupFinding
     counts : mapping of str to float
         Signed counts per turn or metre that its encoders have, where those are not the described ones.
     written : Path or None

@@ -60,8 +60,6 @@ class FirstPowerUp:
 
     Attributes
     ----------
-    beside : Supervisor
-    model : Rig
     hand : callable or None
         Called with a sentence that asks for something to be done, or a question; answers whether it was, or yes. A
         twin moves itself where there is none.
