@@ -116,6 +116,22 @@ def test_findings_do_not_depend_on_the_units_of_a_log(plant, fault):
 
 
 @pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FACTORS)
+def test_a_wrong_sign_or_scale_is_found_beside_a_spike(plant, fault):
+    """Single samples that were read wrongly spoil no equation of motion."""
+    doctored, (alone,) = planted(plant, fault)
+    column = next(n for n in doctored.wiring.sensors if n != doctored.channel)
+    x = doctored.record[column].copy()
+    x[x.size // 2] += 0.5 * np.ptp(x)
+    record = replace(doctored.record, signals={**doctored.record.signals, column: x})
+    found = {f.kind: f for f in examine(record, doctored.rig, doctored.wiring).wrong}
+    assert found.keys() == {alone.kind, "spike"}
+    assert found["spike"].columns == (column,)
+    assert found[alone.kind].columns == alone.columns
+    assert found[alone.kind].evidence["factor [1]"] == pytest.approx(alone.evidence["factor [1]"], rel=0.02)
+
+
+@pytest.mark.parametrize("plant", RIGS)
 def test_a_dead_sensor_is_locked(plant):
     doctored, (finding,) = planted(plant, "dead")
     assert finding.key == f'locked = ["{doctored.channel}"]'
