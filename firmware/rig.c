@@ -372,13 +372,14 @@ static uint8_t take_law(const uint8_t *b) {
 static void exchange(uint8_t sequence, bool current, const uint8_t *b) {
     float offered = get_float(b);
     uint32_t answered = get_u32(b + 4);
+    bool sound = sane(offered);
+    /* before the lock, under which no edge of an encoder is heard */
+    int32_t steps = sound ? (int32_t)offered : 0;
+    if (size_of(steps) > INT16_MAX) steps = steps < 0 ? -INT16_MAX : INT16_MAX;
     uint32_t before = port_lock();
     if (running() && (!current || now.tick - answered > limits.watchdog)) trip(F_STALE);
-    if (running() && !sane(offered)) trip(F_GAINS);
-    if (mode == HOST) {
-        int32_t steps = (int32_t)offered;
-        put_out(steps > INT16_MAX ? INT16_MAX : steps < -INT16_MAX ? -INT16_MAX : (int16_t)steps);
-    }
+    if (running() && !sound) trip(F_GAINS);
+    if (mode == HOST) put_out((int16_t)steps);
     if (mode == MCU) reference = offered;
     if (current) silence = 0;
     awaited = true;

@@ -159,6 +159,21 @@ static void run_until(avr_cycle_count_t cycle) {
     }
 }
 
+/* Edges of an encoder in a slice: the first at a share of it, the others as far apart as the speed says. */
+typedef struct { long left; int way; double at, apart; } edges_t;
+static edges_t edges_of(int i, double before) {
+    long steps = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];
+    edges_t edges = {labs(steps), steps < 0 ? -1 : 1, 0, 0};
+    if (edges.left > EDGES_PER_SLICE) edges.left = EDGES_PER_SLICE;
+    double from = before * plant.counts[i], moved = plant.x[2 * i] * plant.counts[i] - from;
+    /* what an encoder that is not sound shows has no such times, nor what is made up for from an earlier slice */
+    if (mishaps.encoder[i].scale != 1 || edges.left > fabs(moved) + 1) moved = 0;
+    edges.apart = moved ? 1 / fabs(moved) : 1.0 / (double)(edges.left + 1);
+    edges.at = edges.apart;
+    if (moved) edges.at *= moved > 0 ? floor(from + 0.5) + 0.5 - from : from - floor(from + 0.5) + 0.5;
+    return edges;
+}
+
 static void slice(void) {
     static const double dt = (double)SLICE / CLOCK;
     if (bridge) {
@@ -167,21 +182,19 @@ static void slice(void) {
         converter = (int16_t)lround(pushed);
         memset(pushes, 0, sizeof pushes);
     } else pushed = converter;
+    double before[2] = {plant.x[0], plant.x[2]};
     mishaps_move(&mishaps, &plant, enabled, pushed, dt);
-    long steps[2], most = 1;
-    for (int i = 0; i < 2; i++) {
-        steps[i] = encoder_shows(&mishaps.encoder[i], furuta_counts(&plant, i)) - position[i];
-        if (labs(steps[i]) > EDGES_PER_SLICE) steps[i] = steps[i] < 0 ? -EDGES_PER_SLICE : EDGES_PER_SLICE;
-        if (labs(steps[i]) > most) most = labs(steps[i]);
-    }
+    edges_t turns[2];
+    for (int i = 0; i < 2; i++) turns[i] = edges_of(i, before[i]);
     avr_cycle_count_t start = (avr_cycle_count_t)slices * SLICE;
-    for (long k = 1; k <= most; k++) {
-        run_until(start + (avr_cycle_count_t)(SLICE * k / (most + 1)));
-        for (int i = 0; i < 2; i++)
-            if (k <= labs(steps[i])) {
-                position[i] += steps[i] < 0 ? -1 : 1;
-                show(i);
-            }
+    for (;;) {
+        int i = turns[0].left && (!turns[1].left || turns[0].at <= turns[1].at) ? 0 : 1;
+        if (!turns[i].left) break;
+        run_until(start + (avr_cycle_count_t)(SLICE * turns[i].at));
+        position[i] += turns[i].way;
+        turns[i].at += turns[i].apart;
+        turns[i].left--;
+        show(i);
     }
     run_until(start + SLICE);
     slices++;

@@ -31,7 +31,7 @@ MAPS = 8
 """Maps kept of other trees."""
 START = 0.02
 """Seconds that the shortest test costs all the same."""
-BATCH, SLOW_BATCH = 40, 8
+BATCH, SLOW_BATCH = 12, 8
 """Files of quick and of slow tests that run before the map is kept."""
 
 

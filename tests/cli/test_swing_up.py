@@ -18,7 +18,7 @@ def upright(*arguments: object):
 def test_the_pendulum_gets_up_and_the_page_is_written(tmp_path):
     outcome = upright("swing-up", "--rig", "linear", "--seed", 2, "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
-    assert "From hanging to upright" in outcome.stdout
+    assert "Upright after" in outcome.stdout
     assert "What next" in outcome.stdout
     told = json.loads((tmp_path / "swing_up.json").read_text(encoding="utf-8"))
     assert told["swing_up"]["held"]

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks.hazards.sound import law_for
-from upright.control.braking import GRACE, SHARE
+from upright.control.braking import GRACE, SHARE, Braking
 from upright.errors import RigStopped
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, Mode, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
+from upright.simulation import simulate
 
 TRAVEL = {"furuta": 1.2, "linear": 0.15}
 COAST = 0.35  # s, in which a pendulum falls through the bottom
@@ -101,6 +102,43 @@ def test_a_brake_that_drives_the_body_on_is_let_go(seed):
     strongest = SHARE * known.limit * known.linear("inverted").B[1, 0]
     before = 15.0  # rad/s, what the law gave it until the pendulum had left by 25 degrees
     assert speed < before + 1.3 * strongest * (GRACE + known.delay + known.lag + 6 * known.period), why
+
+
+@pytest.mark.parametrize(("make", "carried"), [("furuta", True), ("linear", True), ("linear", False)])
+def test_a_body_under_its_pendulum_needs_its_speed_squared_over_twice_its_deceleration(make, carried):
+    rig = make_rig(make).replace(delay=0.003, lag=0.002)
+    p = rig.plant
+    arm = make == "furuta"
+    M = p.J_d + p.m_p * p.r**2 + p.J_a if arm else p.m_c + p.m_p
+    share = (p.m_p * p.r * p.l_cg if arm else p.m_p * p.l_cg) / M if carried else 0.0
+    braking = Braking(rig, "inverted", rig.limit, falls=carried)
+    x = np.zeros((3, 4))
+    x[:, 2] = math.pi
+    x[:, :2] = [[0.1, 2.0], [-0.1, -2.0], [0.1, -2.0]]
+    a = 0.5 * rig.limit * rig.gain / M
+    sway = min(1.5 * share, 0.5 * 3.0)
+    away = 0.1 + 2.0 * (0.005 + 6 * rig.period) + 2.0**2 / (2 * a) + sway
+    assert braking.farthest(x, 3.0) == pytest.approx([away, away, 0.1 + sway], rel=1e-9)
+    # what comes to rest is the momentum of both, and upright the two masses' coupling has the other sign than hanging
+    way = 1.0 if arm else -1.0
+    x[:, 3] = 0.5
+    p = 2.0 + way * share * 0.5
+    moved = 0.1 + p * (0.005 + 6 * rig.period) + p**2 / (2 * a) + sway
+    assert braking.farthest(x, 3.0)[0] == pytest.approx(moved, rel=1e-9)
+
+
+@pytest.mark.parametrize(("make", "v", "far"), [("furuta", 5.0, 9.0), ("linear", 0.5, 0.15)])
+def test_a_body_without_its_drive_coasts_as_far_as_its_friction_lets_it(make, v, far):
+    """``M v' = -b v - T``; the firmware's page prints these. The pendulum that hangs on it swings 2 % of that away."""
+    rig = make_rig(make)
+    p, arm = rig.plant, make == "furuta"
+    M = p.J_d + p.m_p * p.r**2 + p.J_a if arm else p.m_c + p.m_p
+    expected = M / p.b_1 * (v - p.b_1c / p.b_1 * math.log(1 + p.b_1 * v / p.b_1c))
+    x0 = p.state("hanging")
+    x0[1] = v
+    x = simulate(p, rig.drive, x0, np.zeros(2), 1e-3, samples=20_000, substeps=2)[:, 0, 0]
+    assert x.max() == pytest.approx(expected, rel=0.03)
+    assert expected == pytest.approx(far, rel=0.01)
 
 
 def started(pressed):

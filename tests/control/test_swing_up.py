@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from upright.control import Trial, design_swing_up
+from upright.control import Trial, design_swing_up, trial
 from upright.control.swing_up import (
     AWAY,
     FADE,
@@ -19,16 +19,20 @@ from upright.control.swing_up import (
     SWINGING,
     TRAVEL,
     TRIPPED,
+    UPRIGHT,
     Ascent,
     Body,
+    _within,
     ascent_of,
     body,
     swing_and_hold,
-    swing_up,
 )
-from upright.errors import BadInput
+from upright.errors import BadInput, RigStopped
 from upright.records import Record
 from upright.rig.makes import make_rig
+from upright.rigs import Board, Limits, TwinPort
+from upright.rigs.protocol import Fault
+from upright.rigs.supervisor import Duty, Supervisor
 
 MAKES = ("furuta", "linear")
 
@@ -46,6 +50,13 @@ def law(request):
 def frictionless(make):
     plant = make_rig(make).plant
     return replace(make_rig(make), plant=plant.replace(**{n: 0.0 for n in plant.names() if n.startswith("b_")}))
+
+
+def swing_up(rig, law, *, seconds, pushes=None):
+    """What the law comes to on a rig that hangs at rest."""
+    plant = rig.plant
+    rule, start = law.rule(rig, plant.state("hanging")), plant.state("hanging") - plant.state("inverted")
+    return ascent_of(trial(rig, rule, at="inverted", start=start, seconds=seconds, pushes=pushes), law, rule)
 
 
 def crane(rig):
@@ -113,6 +124,100 @@ def test_the_catch_is_the_ellipsoid_of_twice_the_limit(make):
         A = model.A - left * model.B @ K[None]
         assert np.linalg.eigvalsh(law.P @ A + A.T @ law.P).max() <= 1e-9 * np.linalg.norm(law.P @ A)
     assert 0 < law.size <= 0.8 * law.sure
+
+
+@pytest.mark.parametrize("make", MAKES)
+def test_a_pump_of_bounded_acceleration_moves_its_body_no_faster_than_that_allows(make):
+    """Spring and damper pushed by any signal within ``reach``: its size times the integral of the absolute impulse
+    response bounds place and speed, coth(pi s/(2 sqrt(1 - s^2)))/centre for a place with damping s."""
+    law = designed(make)
+    w, s = math.sqrt(law.centre), law.damp / (2 * math.sqrt(law.centre))
+    wd = w * math.sqrt(1 - s**2)
+    t = np.linspace(0, 20 / (s * w), 200_001)
+    place = np.exp(-s * w * t) * np.sin(wd * t) / wd
+    assert np.trapezoid(np.abs(place), t) == pytest.approx(
+        1 / law.centre / math.tanh(math.pi * s / 2 / math.sqrt(1 - s**2)), rel=1e-4
+    )
+    speed = law.reach * np.trapezoid(np.abs(np.gradient(place, t)), t)
+    rig = frictionless(make).replace(limit=100.0 * make_rig(make).limit)  # the force is never short
+    run = swing_up(rig, replace(law, body=body(rig), limit=rig.limit), seconds=1.5)
+    assert np.all(run.mode == SWINGING)
+    x = run.trial.x
+    assert np.abs(x[:, 1]).max() <= speed
+    assert np.abs(x[:, 0]).max() <= law.reach / law.centre / math.tanh(math.pi * s / 2 / math.sqrt(1 - s**2))
+    # a square wave at the pendulum's own frequency, by its first harmonic: no swing keeps the pump slower
+    omega = law.body.omega
+    slowest = 4 / math.pi * law.reach * omega / math.hypot(law.centre - omega**2, law.damp * omega)
+    assert np.abs(x[:, 1]).max() >= slowest
+
+
+TIGHT = {"furuta": (1.3, 8.0), "linear": (0.15, 0.44)}
+"""Travel and speed at which the law for the whole travel would be stopped."""
+
+
+@cache
+def tight(make):
+    travel, speed = TIGHT[make]
+    return design_swing_up(make_rig(make), travel=travel, speeds=(speed, 20.0))
+
+
+def supervised(make, seed, law, stop_at=math.inf):
+    """Farthest and fastest of the body of a drawn rig that swings up beside its supervisor, how it ended, and whether
+    it stands; with a stop that brakes after a time, and then until it has come to rest."""
+    travel, speed = TIGHT[make]
+    known = make_rig(make)
+    limits = Limits(travel=(travel, math.inf), speed=(speed, math.inf), start=(math.inf,) * 2, command=known.limit)
+    port = TwinPort(make_rig(make, seed))
+    rig = Board(port)
+    beside = Supervisor(rig, Duty(limits=limits, model=known, at="inverted", zero="hanging", watch=False))
+    beside.prepare()
+    beside.aim(law.rule(known, known.plant.state("hanging")))
+    beside.start()
+    tick, far, fast, said = rig.exchange(0.0), 0.0, 0.0, ""
+    for k in range(round(8.0 / known.period)):
+        try:
+            if k * known.period >= stop_at:
+                beside.give_up(Fault.SATURATION, "asked for")
+            tick = rig.exchange(beside.step(tick))
+        except RigStopped as stop:
+            said = str(stop)
+            break
+        far, fast = max(far, abs(port.x[0])), max(fast, abs(port.x[1]))
+    for _ in range(round(0.35 / known.period) if said else 0):
+        rig.alone(known.period)
+        far = max(far, abs(port.x[0]))
+    return far, fast, said, abs(math.remainder(port.x[2] - math.pi, math.tau)) < UPRIGHT
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", MAKES)
+def test_a_designed_swing_up_is_not_stopped_where_one_for_the_whole_travel_is(make):
+    travel, speed = TIGHT[make]
+    for seed in (1, 2):
+        far, fast, said, stands = supervised(make, seed, tight(make))
+        assert (said, stands) == ("", True), seed
+        assert far < travel
+        assert fast < speed
+    whole = _within(make_rig(make), body(make_rig(make)), travel, travel, 0.8)
+    assert any(supervised(make, seed, whole)[2] for seed in (1, 2))
+
+
+@pytest.mark.parametrize("make", MAKES)
+def test_a_swing_up_that_is_stopped_at_any_moment_ends_within_its_travel(make):
+    rng = np.random.default_rng(4)
+    for moment in rng.uniform(0.5, 4.0, 4):
+        far, _, said, _ = supervised(make, 2, tight(make), moment)
+        assert said.startswith("Asked for")
+        assert far <= TIGHT[make][0], moment
+
+
+def test_where_no_swing_up_can_be_stopped_in_time_a_sentence_says_what_is_missing():
+    rig = make_rig("linear")
+    with pytest.raises(BadInput, match=r"with 0\.\d+ m/s, of 0\.2, .* allow more travel or speed"):
+        design_swing_up(rig, speeds=(0.2, math.inf))
+    omega = designed("linear").body.omega
+    with pytest.raises(BadInput, match=f"passes the bottom with {2 * omega:.3g} rad/s"):
+        design_swing_up(rig, speeds=(math.inf, 2.05 * omega))
 
 
 def test_every_rig_of_the_make_gets_up_and_stays(law):

@@ -72,6 +72,19 @@ def test_the_watch_speaks_before_the_fall(make):
     assert np.abs(run.deviation[-1, 1]) < 0.02
 
 
+@pytest.mark.parametrize("make", MAKES)
+@pytest.mark.parametrize("shown", [(1.0, 1.0), (1.0, -1.0), (4.0, 1.0)])
+def test_a_loop_in_a_mirror_is_suspected_of_the_same_at_the_same_sample(make, shown):
+    """Linear models are odd, and so are the law and what a hand can do."""
+    watch, _ = loop(make)
+    alarm, run = watched(make, shown, seconds=1.0)
+    seen = np.column_stack([run.record[c.name] for c in watch.model.plant.coordinates]) - run.rest
+    mirrored = watch.over(-seen, -run.u)
+    assert (mirrored.sample == alarm.sample).all()
+    assert mirrored.what == alarm.what
+    assert mirrored.odds == pytest.approx(alarm.odds, rel=1e-9, abs=1e-9)
+
+
 @pytest.mark.slow
 def test_a_watched_drive_stops_pushing():
     """The same run up to the alarm, no command after it, and then no more energy than a falling pendulum has."""

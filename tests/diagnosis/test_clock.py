@@ -198,3 +198,13 @@ def test_steps_are_drawn_in_milliseconds_where_they_end():
     (curve,) = steps_panel(np.array([0.0, 0.01, 0.03])).curves
     assert curve.t.tolist() == [0.01, 0.03]
     assert curve.y == pytest.approx([10.0, 20.0])
+
+
+def test_rows_of_one_instant_are_equal_when_the_second_repeats_the_first(tmp_path):
+    """The second row is written twice; two rows of the instant after the next are not the same."""
+    rows = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 0.9), (3, 1.2), (3, 1.3), *((k, np.sin(0.1 * k)) for k in range(4, 100))]
+    log = tmp_path / "log.csv"
+    log.write_text("time [s],x [m]\n" + "".join(f"{0.01 * k:.2f},{x:.6f}\n" for k, x in rows), encoding="utf-8")
+    record, (finding,) = read_mended(log)
+    assert finding.evidence == {"repeated instants [1]": 2.0, "equal rows [1]": 1.0}
+    assert len(record) == 100

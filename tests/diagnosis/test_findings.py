@@ -35,7 +35,7 @@ def test_a_dead_sensor_is_told_by_what_acts_or_moves():
         "'y' reads 2.5 from the first to the last sample although 'x' moves: the sensor is dead, or the body was "
         "clamped."
     )
-    assert finding.evidence == {"samples [1]": 1000, "value [1]": 2.5}
+    assert finding.evidence == {"samples [1]": 1000, "value [m]": 2.5}
     assert (finding.severity, finding.key) == ("fault", 'locked = ["q_y"]')
     (finding,), _ = found_in(
         "dead", x=SWING, y=np.full(1000, 2.5), u=np.sin(T), drive="u", measured=("x", "y"), columns=flat

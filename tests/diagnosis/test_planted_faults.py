@@ -54,7 +54,7 @@ def test_a_wrong_sign_or_scale_is_undone(plant, fault):
     assert finding.key.startswith(f"[{table}]\n{cure}")
 
 
-SIGNED = {"dead": "value [1]", "jump": "jump [", "effort": "value [1]", "spike": "largest"}
+SIGNED = {"dead": "value [", "jump": "jump [", "effort": "value [1]", "spike": "largest"}
 """Evidence that turns with the columns."""
 LATER = 1024.0
 IN_CLOCK = ("from [s]", "end [s]", "logged end [s]")
@@ -87,6 +87,48 @@ def test_findings_are_those_of_the_rig_in_a_mirror(plant, fault):
         turned = {n: -v if n.startswith(SIGNED.get(here.kind, "-")) else v for n, v in here.evidence.items()}
         assert mirrored.evidence == pytest.approx(turned, rel=1e-6, abs=1e-9)
         assert mirrored.spans == here.spans
+
+
+OTHER_UNITS = {"rad": (180 / math.pi, "deg"), "m": (1000.0, "mm"), "counts": (1.0, "counts")}
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_findings_do_not_depend_on_the_units_of_a_log(plant, fault):
+    """Evidence in a column's own unit is in the other one then, and so is a ratio of a column to the command."""
+    doctored, before = planted(plant, fault)
+    record, wiring = doctored.record, doctored.wiring
+    per = {n: OTHER_UNITS[unit] for n, unit in record.units.items() if unit}
+    signals = {n: per[n][0] * x if n in per else x for n, x in record.signals.items()}
+    sensors = {n: replace(s, unit=per[n][1], offset=per[n][0] * float(s.offset)) for n, s in wiring.sensors.items()}
+    record = replace(record, signals=signals, units={n: unit for n, (_, unit) in per.items()})
+    after = examine(record, doctored.rig, replace(wiring, sensors=sensors)).wrong
+    for here, other in zip(before, after, strict=True):
+        assert (other.kind, other.columns, other.severity) == (here.kind, here.columns, here.severity)
+        assert len(other.evidence) == len(here.evidence)
+        for (name, value), (theirs, found) in zip(here.evidence.items(), other.evidence.items(), strict=True):
+            own = next((unit for unit in ("rad", "m") if name.endswith(f"[{unit}]")), "")
+            times, unit = OTHER_UNITS.get(own, (1.0, ""))
+            if fault == "effort is the position" and name == "factor [1]":
+                times = 1 / per[next(iter(wiring.sensors))][0]
+            assert theirs == (name.replace(f"[{own}]", f"[{unit}]") if own else name)
+            assert found == pytest.approx(times * value, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("plant", RIGS)
+@pytest.mark.parametrize("fault", FACTORS)
+def test_a_wrong_sign_or_scale_is_found_beside_a_spike(plant, fault):
+    """Single samples that were read wrongly spoil no equation of motion."""
+    doctored, (alone,) = planted(plant, fault)
+    column = next(n for n in doctored.wiring.sensors if n != doctored.channel)
+    x = doctored.record[column].copy()
+    x[x.size // 2] += 0.5 * np.ptp(x)
+    record = replace(doctored.record, signals={**doctored.record.signals, column: x})
+    found = {f.kind: f for f in examine(record, doctored.rig, doctored.wiring).wrong}
+    assert found.keys() == {alone.kind, "spike"}
+    assert found["spike"].columns == (column,)
+    assert found[alone.kind].columns == alone.columns
+    assert found[alone.kind].evidence["factor [1]"] == pytest.approx(alone.evidence["factor [1]"], rel=0.02)
 
 
 @pytest.mark.parametrize("plant", RIGS)

@@ -106,6 +106,24 @@ def test_edges_are_counted_at_every_speed_that_the_tick_leaves_room_for(avr):
     assert ticks[-1].counts[1] > 10_000
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("arm", "pendulum"), [(14.0, 14.0), (0.0, 20.0)])
+def test_a_driven_rig_that_swings_fast_is_counted_edge_by_edge(avr, arm, pendulum):
+    """Of 16,000 a turn; a pendulum of 20 cm that comes from upright passes the bottom with 14 rad/s."""
+    free = {**PARAMETERS, "b_1": 0.0, "b_2": 0.0, "g": 1e-9, "r": 1e-9}
+    board = avr(*plant(free, 1e-9, psi_dot=arm, theta_dot=pendulum))
+    rig = started(board, Mode.HOST, limits=FREE)
+    first, began = rig.exchange(0.0), board.state()
+    ticks = [rig.exchange(0.001 * (k % 7)) for k in range(700)]
+    assert {t.mode for t in ticks} == {Mode.HOST}
+    ended = board.state()
+    for i, speed in enumerate((arm, pendulum)):
+        edges = (ended[1 + 2 * i] - began[1 + 2 * i]) * COUNTS
+        # the board stands still up to a tick after a sample
+        assert abs(ticks[-1].counts[i] - first.counts[i] - edges) <= 2 * speed * COUNTS / 1000 + 1
+        assert edges >= 0.5 * speed * COUNTS - 1
+
+
 def test_a_processor_that_cannot_keep_up_stops(avr):
     far_too_fast = {"psi_dot": 20.0, "theta_dot": 20.0}  # 100,000 edges a second, and a law besides
     board = avr(*plant({**PARAMETERS, "b_1": 0.0, "b_2": 0.0, "g": 1e-9, "r": 1e-9}, GAIN, **far_too_fast))

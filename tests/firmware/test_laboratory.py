@@ -121,6 +121,19 @@ def test_a_rig_behind_a_wire_is_identified_held_swung_up_and_let_swing(host, tmp
     assert len(asked) == 4 + len([s for s in sets.values() if s["after"]]) + 2 + 2
 
 
+def minute(board, folder, travel=2.0, speed=20.0, **more):
+    """Numbers of a minute at a board, with more lines in the `[board]` of its RIG.toml; nobody but once is asked."""
+    text = RIG.format(port=board.port).replace('"2 rad"', f'"{travel} rad"').replace('"20 rad/s"', f'"{speed} rad/s"')
+    lines = "\n".join(["[board]", *(f"{key} = {value}" for key, value in more.items())])
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    (folder / "RIG.toml").write_text(text.replace("[board]", lines), encoding="utf-8")
+    asked: list[str] = []
+    done = up.lab(rig=str(folder / "RIG.toml"), quick=True, out=folder / "out",
+                  ask=lambda sentence: not asked.append(sentence))  # fmt: skip
+    assert len(asked) == 1
+    return done.numbers["experiments"]["quick"]["numbers"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("wiring", "refused"),
@@ -132,13 +145,7 @@ def test_firmware_comes_upright_in_a_minute_or_its_wiring_is_named(host, tmp_pat
     given = {**wiring, "gain": wiring.get("gain", GAIN)}
     arguments = [a for a in plant(TRUTH.parameters(), GAIN) if a.partition("=")[0] not in given]
     board = host(*arguments, *(f"{name}={value!r}" for name, value in given.items()))
-    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    (tmp_path / "RIG.toml").write_text(RIG.format(port=board.port), encoding="utf-8")
-    asked: list[str] = []
-    done = up.lab(rig=str(tmp_path / "RIG.toml"), quick=True, out=tmp_path / "out",
-                  ask=lambda sentence: not asked.append(sentence))  # fmt: skip
-    told = done.numbers["experiments"]["quick"]["numbers"]
-    assert len(asked) == 1
+    told = minute(board, tmp_path)
     assert told["refused"] == refused
     milliseconds, arm, _, theta, *_ = board.state()
     assert milliseconds < 60_000
@@ -147,3 +154,26 @@ def test_firmware_comes_upright_in_a_minute_or_its_wiring_is_named(host, tmp_pat
         assert told["upright"]
         assert abs(abs(theta) % (2 * math.pi) - math.pi) < math.radians(10)
         assert not misses(told["fit"], ("J_d", "J_p", "b_1", "b_2", "actuator.gain"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("travel", "speed"), [(1.6, 8.0), (3.0, 5.0)])
+def test_firmware_with_tight_limits_comes_upright_within_them(host, tmp_path, travel, speed):
+    board = host(*plant(TRUTH.parameters(), GAIN))
+    told = minute(board, tmp_path, travel, speed)
+    assert told["upright"], told["verdict"]
+    log = read_log(tmp_path / "out" / "quick" / "swing_up.mcap")
+    assert np.abs(log.columns["psi"]).max() < travel
+    t, psi = log.columns["t"], log.columns["psi"]
+    assert np.abs((psi[8:] - psi[:-8]) / (t[8:] - t[:-8])).max() < speed  # as the board measures it
+
+
+@pytest.mark.slow
+def test_the_mega_s_own_program_brings_its_rig_upright_in_a_minute(avr, tmp_path):
+    """With every edge that its encoders have on the way up, 35,000 a second at the bottom."""
+    board = avr(*plant(TRUTH.parameters(), GAIN))
+    told = minute(board, tmp_path, lockstep="true")
+    assert told["upright"]
+    milliseconds, arm, *_ = board.state()
+    assert milliseconds < 60_000
+    assert abs(arm) < 2.0

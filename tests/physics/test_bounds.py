@@ -7,13 +7,15 @@ first link may be balanced on its joint. The sine of a rig's lean stays below th
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from dataclasses import MISSING, dataclass, fields
 
 import pytest
 
-from upright.errors import ImpossiblePhysics
-from upright.physics import BUILT_IN, added_inertia, added_mass
+from upright.errors import BadInput, ImpossiblePhysics
+from upright.physics import BUILT_IN, Pendulum, added_inertia, added_mass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,3 +107,20 @@ def test_masses_are_counted_from_none_and_weigh_something():
     ):  # fmt: skip
         with pytest.raises(ImpossiblePhysics):
             wrong()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"m_p": 0.2, "l_cg": 0.2, "b_1": 1e-3}, "Pendulum has no parameter 'b_1'; did you mean 'b_2'"),
+        ({"m_p": 0.2}, r"Pendulum also needs l_cg, pivot to centre of gravity \[m\]"),
+    ],
+)
+def test_a_plant_answers_for_what_is_misspelt_or_missing(given, said):
+    with pytest.raises(BadInput, match=said):
+        Pendulum(**given)
+
+
+def test_a_plant_can_be_sent_and_copied():
+    rod = Pendulum(m_p=0.2, l_cg=0.2)
+    assert pickle.loads(pickle.dumps(rod)) == copy.deepcopy(rod) == rod

@@ -80,6 +80,19 @@ def test_a_difference_quotient_is_no_sensor_but_a_tachometer_is() -> None:
     assert seen.column("p").lies == ()
 
 
+@pytest.mark.parametrize("weight", [0.05, 0.4, 0.7])
+def test_the_weight_of_a_filtered_difference_quotient_is_that_of_its_program(weight: float) -> None:
+    """v[k] - v[k-1] is the weight times what the new quotient is ahead of the last value."""
+    t, theta = swing()
+    counts = counted(theta, 2 * math.pi / 2000)
+    quotient = np.diff(counts, prepend=counts[0]) / 2e-3
+    filtered = np.zeros_like(quotient)
+    for k in range(1, t.size):
+        filtered[k] = filtered[k - 1] + weight * (quotient[k] - filtered[k - 1])
+    lies = inspect(Record(t=t, signals={"p": counts, "v": filtered})).column("v").lies
+    assert f"first-order filter (weight {weight:.2g})" in " ".join(lies)
+
+
 def test_an_exact_rate_beside_an_exact_position_is_not_accused() -> None:
     t, theta = swing()
     assert inspect(Record(t=t, signals={"p": theta, "v": np.gradient(theta, t)})).column("v").lies == ()

@@ -47,7 +47,8 @@ class Rendered:
         with open(self._template.filename, encoding="utf-8") as file:
             text = file.read().splitlines()
         numbers = sorted({self._template.get_corresponding_lineno(n) for n in self._code - self._seen})
-        return {n: text[n - 1] for n in numbers if not text[n - 1].startswith(("{% macro", "{% set"))}
+        # Jinja looks its filters up in the first line, each with an error for one that there is not
+        return {n: text[n - 1] for n in numbers if n > 1 and not text[n - 1].startswith(("{% macro", "{% set"))}
 
 
 def _lines(code: CodeType) -> Iterator[int]:

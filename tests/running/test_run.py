@@ -22,6 +22,7 @@ from upright.report.run import chapter, draw_run
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
 from upright.rigs.rigfile import read_rig_file
+from upright.rigs.supervisor import BRAKING
 from upright.running import run as run_module
 from upright.running.chapter import run_chapter
 from upright.running.rig import excitation_law, model_and_truth, read_law, stage_of
@@ -171,6 +172,27 @@ def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
     assert not done.sound
     assert np.abs(done.log.columns["psi"]).max() <= math.radians(3)
     assert any(event.kind == "fault" for event in done.log.events)
+
+
+def test_the_samples_of_a_braked_run_are_in_its_log_and_are_not_its_law_s(folder, tmp_path):
+    """Let go where its law drives it out, it is braked to rest: output against speed, until the log ends."""
+    text = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "0.8 rad"\n'
+    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
+    order = RunRequest(rig=tmp_path / "RIG.toml", law=folder / "design.json", seconds=2.0, tilt=0.12, check=False)
+    done = run_rig(order, tmp_path)
+    assert done.end.faults & Fault.OVERTRAVEL
+    log = done.log
+    braked = np.flatnonzero(log.columns["mode"] == BRAKING)
+    assert log.header.modes[BRAKING] == "BRAKING"
+    assert braked.size > 5
+    assert braked.tolist() == list(range(len(log) - braked.size, len(log)))
+    assert set(np.diff(log.columns["tick"])) == {1}  # no tick is missing between law and brake
+    speed = np.gradient(log.columns["psi"], log.columns["t"])
+    assert abs(speed[-2]) < 0.3 * abs(speed[braked[0]])
+    assert np.sign(log.columns["u"][braked[0]]) == -np.sign(speed[braked[0]])
+    again = replay(read_log(done.log_path))
+    assert again.identical
+    assert again.rows.tolist() == list(range(braked[0]))
 
 
 def test_a_run_that_ended_well_leaves_no_fault_in_the_rig(folder, tmp_path):

@@ -15,8 +15,8 @@ from upright.workers.labour import Pool
 class Clerk(Pool):
     """Two workers in this process: what they are handed, they do when they are asked for results."""
 
-    def __init__(self, deaths=()):
-        self.width, self.name, self.deaths = 2, "2 clerks", list(deaths)
+    def __init__(self, deaths=(), interrupted=0):
+        self.width, self.name, self.deaths, self.interrupted = 2, "2 clerks", list(deaths), interrupted
         self.begun, self.most, self.stopped, self.open = [], 0, False, []
 
     def executor(self):
@@ -25,6 +25,8 @@ class Clerk(Pool):
     def submit(self, do, order, item):
         future = Future()
         self.begun.append(item)
+        if len(self.begun) == self.interrupted:
+            raise KeyboardInterrupt
         if len(self.begun) in self.deaths:
             future.set_exception(BrokenExecutor("died"))
         else:
@@ -43,8 +45,8 @@ def square(item, tell):
 
 @pytest.fixture
 def with_clerk(monkeypatch):
-    def go(items, deaths=(), progress=lambda step, share: None):
-        clerk = Clerk(deaths)
+    def go(items, deaths=(), interrupted=0, progress=lambda step, share: None):
+        clerk = Clerk(deaths, interrupted)
         # a clerk sits in this process, whose linear algebra other tests use as well
         monkeypatch.setattr("upright.workers.labour._one_thread", lambda: None)
         monkeypatch.setattr(import_module("upright.workers.spread"), "Processes", lambda number: clerk)
@@ -70,6 +72,16 @@ def test_two_items_for_each_worker_are_handed_out_before_any_is_waited_for(with_
     begun = []
     with_clerk(list(range(7)), progress=lambda step, share: begun.append(step))
     assert begun[1] == "twin 4 of 7, on 2 clerks"
+
+
+def test_ctrl_c_keeps_what_was_done_but_not_fetched_yet(with_clerk):
+    """It comes while the third item is handed out; the first two are done by then, and one of them by nobody."""
+    done, clerk = with_clerk(list(range(7)), interrupted=3)
+    assert done.interrupted
+    assert done.so_far() == [0, 1]
+    done, clerk = with_clerk(list(range(7)), deaths=[1], interrupted=3)
+    assert done.so_far() == [1]
+    assert clerk.stopped
 
 
 def test_what_died_with_its_worker_is_begun_again(with_clerk):

@@ -12,7 +12,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
+
+from upright.records import Array
 from upright.rig import Rig
 
 SHARE = 0.5
@@ -50,6 +54,7 @@ class Braking:
     """
 
     def __init__(self, model: Rig, at: str, command: float, *, falls: bool) -> None:
+        self._at = list(model.plant.equilibrium(at).values())
         i = self.which = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
         M = model.plant.mass_matrix(at)[i]
         self._other = 1 - i if falls else i
@@ -65,11 +70,20 @@ class Braking:
         speed, other = ((away[-1][i] - away[0][i]) / for_ for i in (self.which, self._other))
         return speed if alone else speed + self._carried * math.cos(away[-1][self._other]) * other
 
-    def distance(self, momentum: float, travel: float) -> float:
+    def distance(self, momentum: Any, travel: float) -> Any:
         """From where braking begins to the farthest [rad or m], for a momentum outwards, within a travel."""
-        v = max(0.0, momentum)
+        v = np.maximum(0.0, momentum)
         sway = min(SWAY * abs(self._carried), RESERVED * travel)
         return v * self._late + v**2 / (2 * abs(self._per_command) * self._most) + sway
+
+    def farthest(self, x: Array, travel: float) -> Array:
+        """Where the body comes to rest when it is braked from each of the states, shape (N, 4, ...), within a travel.
+
+        Shape (N, ...); [rad or m], from the middle.
+        """
+        q, v, w = x[:, 2 * self.which], x[:, 2 * self.which + 1], x[:, 2 * self._other + 1]
+        p = v + self._carried * np.cos(x[:, 2 * self._other] - self._at[self._other]) * w if self._carried else v
+        return np.abs(q) + self.distance(np.sign(q) * p, travel)
 
     def goes_on(self, momentum: float, first: float) -> bool:
         """Whether to brake on at a momentum, when it was another at first."""

@@ -7,6 +7,9 @@ for stays below twice the limit: there saturation leaves at least half of it, an
 gain, so that x'Px falls. That is exact for the linear model only; on the nonlinear one the ellipsoid is then shrunk
 until a few hundred motions from its surface all come to rest within the travel.
 
+The law is for as much of the travel as all rigs that the fit allows keep, from hanging until they stand, with a
+margin: no faster than the limits of speed, and at every moment so that `control.braking` ends within the travel.
+
 Far from upright it pumps: the pivot is moved along with the swing and does the work ``-kappa cos(theta) theta' a``,
 by less as the energy comes near that of rest upright (Astrom and Furuta, Automatica 36, 2000), while a spring and a
 damper keep the driven body near the middle. Upright, it is a state feedback.
@@ -15,6 +18,7 @@ damper keep the driven body near the middle. Upright, it is a state feedback.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, floor, pi, sin
 from typing import Any
@@ -22,13 +26,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from upright.control.trial import SUBSTEPS, Trial, readings, trial
+from upright.control.braking import Braking
+from upright.control.trial import SUBSTEPS, Trial, readings
 from upright.errors import BadInput
 from upright.gains import filtered, place_sampled
 from upright.gains.requests import poles_of
 from upright.laws import Rule
 from upright.records import Array
 from upright.rig import Rig
+from upright.rig.variation import allowed
 from upright.simulation import simulate
 
 SWINGING, HOLDING, TRIPPED = 0.0, 1.0, 2.0
@@ -103,8 +109,18 @@ NEAR = 0.5
 """Angle from upright [rad] beyond which the linear model is not used: sin 0.5 is 4 % below 0.5."""
 AWAY = 0.7
 """Angle from upright [rad] at which the pendulum counts as fallen and is swung up again."""
+UPRIGHT = math.radians(10)
+"""Angle from upright within which the pendulum counts as up [rad]."""
 FADE = 0.01
 """Time constant with which the step of the command at the handover fades [s]."""
+SHARES = tuple(0.93**k for k in range(17))
+"""Of the travel, for which a law is made until all rigs keep within its limits."""
+MARGIN = 0.95
+"""Share of travel and speeds that a design uses: a speed is measured over a few samples."""
+LANES, SECONDS, ASIDE = 24, 14.0, 0.15
+"""Rigs of the fit, how long each swings up and stands [s], and how far from the middle it may begin, of the travel."""
+ENOUGH = 0.5
+"""Share of them that must stand at the end."""
 LEARN, PAUSE = 0.04, 0.2
 """By how much of `weight` more energy is asked for when a swing turned short of upright, less when it went over, since
 the model's energy is that of another rig; at most ten times, and no sooner again than this [s]."""
@@ -243,8 +259,10 @@ class SwingUp:
         )  # fmt: skip
 
 
-def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 0.8) -> SwingUp:
-    """Swing-up and catch for a rig's model.
+def design_swing_up(
+    model: Rig, *, travel: float | None = None, speeds: Sequence[float] = (), memory: float = 0.8, seed: int = 0
+) -> SwingUp:  # fmt: skip
+    """Swing-up and catch for a rig's model, which can be stopped within travel and speed at every moment.
 
     Parameters
     ----------
@@ -252,21 +270,65 @@ def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 
         As it is known; its numbers need not be those of the rig that the law will meet.
     travel : float, optional
         How far the driven body may go from the middle [m or rad]; what the rig says when omitted.
+    speeds : sequence of float, optional
+        Limits of the driven body's and the pendulum's speed [m/s or rad/s]; the rig's own for the body when omitted.
     memory : float
         Of the filtered differences that give the speeds.
+    seed : int
+        Of the rigs that the model's fit allows, on which it is tried.
 
     Raises
     ------
     BadInput
-        When the rig has no pendulum to swing up, or no catch keeps within limit and travel.
+        When the rig has no pendulum to swing up, or no swing-up keeps within limit, speeds and travel.
     """
+    known = model.travel if math.isfinite(model.travel) else TRAVEL[model.plant.coordinates[0].unit]
+    room, most = known if travel is None else travel, tuple(speeds) or (model.speed_limit, math.inf)
+    units = [c.unit for c in model.plant.coordinates]
+    b = body(model)
+    if 2 * b.omega >= MARGIN * most[1]:
+        raise BadInput(
+            f"a pendulum of {model.name} that has the energy to stand passes the bottom with {2 * b.omega:.3g} "
+            f"{units[1]}/s, and its speed is limited to {most[1]:.3g}; allow more."
+        )
+    far, fast, stand = math.inf, np.zeros(2), 0.0
+    for share in SHARES:
+        law = _within(model, b, share * room, room, memory)
+        far, fast, stand = _tried(law, model, seed)
+        if far <= MARGIN * room and np.all(fast <= MARGIN * np.array(most)):
+            if stand >= ENOUGH:
+                return law
+            break
+    raise BadInput(
+        f"no swing-up of {model.name} keeps within its limits: the last that was tried moves its driven body with "
+        f"{fast[0]:.3g} {units[0]}/s, of {most[0]:.3g}, takes {far:.3g} {units[0]} of travel with what braking needs, "
+        f"of {room:.3g}, and brings {stand:.0%} of the rigs upright in {SECONDS:g} s; allow more travel or speed."
+    )
+
+
+def _tried(law: SwingUp, model: Rig, seed: int) -> tuple[float, Array, float]:
+    """How far a swing-up may go if it is braked at its worst moment, its largest speeds, and the share that stands.
+
+    Over rigs that the fit allows.
+    """
+    start = np.tile(model.plant.state("hanging"), (LANES, 1))
+    start[:, 0] += np.linspace(-ASIDE, ASIDE, LANES) * law.travel
+    x = simulate(
+        model.plant, dict(model.drive) | dict(allowed(model, LANES, seed)), start, None, model.period,
+        samples=round(SECONDS / model.period), substeps=SUBSTEPS, loop=law.rule(model, start),
+    )[:, :4]  # fmt: skip
+    braking = Braking(model, "inverted", model.saturation, falls=True)
+    fast, last = np.abs(x[:, 1::2]).max(axis=(0, 2)), np.mod(x[-round(0.5 / model.period) :, 2], 2 * math.pi) - math.pi
+    stand = float(np.mean(np.abs(last).max(axis=0) < UPRIGHT))
+    return float(braking.farthest(x, law.travel).max()), fast, stand
+
+
+def _within(model: Rig, b: Body, room: float, travel: float, memory: float) -> SwingUp:
+    """Of a pump and a feedback for a room within the travel."""
     from scipy.linalg import solve_continuous_are
 
-    b = body(model)
-    known = model.travel if math.isfinite(model.travel) else TRAVEL[model.plant.coordinates[0].unit]
-    room = known if travel is None else travel
     linear = model.linear("inverted")
-    # Bryson: a quarter of the travel, half a radian and half the limit cost alike
+    # Bryson: a quarter of the room, half a radian and half the limit cost alike
     Q, R = np.diag([(4 / room) ** 2, 0.0, 4.0, 0.0]), (2 / model.saturation) ** 2
     P = np.asarray(solve_continuous_are(linear.A, linear.B, Q, np.array([[R]])), dtype=np.float64)
     K = (linear.B.T @ P / R)[0]
@@ -279,7 +341,7 @@ def design_swing_up(model: Rig, *, travel: float | None = None, memory: float = 
         fast=min(math.sqrt(0.2 * b.weight / max(b.spin, 1e-12)), room * b.omega),
         # half of what would hold the pendulum level, and no wider a swing of the pivot than fits
         reach=min(0.5 * b.weight / abs(b.kappa), 0.3 * room * b.omega**2), sharp=4.0,
-        centre=centre**2, damp=1.5 * centre, travel=room, period=model.period, gain=model.gain,
+        centre=centre**2, damp=1.5 * centre, travel=travel, period=model.period, gain=model.gain,
         limit=model.saturation, lost=model.drive.get("actuator.dead_zone", 0.0),
     )  # fmt: skip
     return replace(law, size=0.8 * sure * _share(law, model))
@@ -311,10 +373,6 @@ def _share(law: SwingUp, model: Rig, *, rays: int = 40, seconds: float = 2.5) ->
     if within == 0:
         raise BadInput(f"no catch of {model.name} keeps within its limit and a travel of {law.travel:g}; allow more.")
     return float(radii[within - 1] ** 2)
-
-
-UPRIGHT = math.radians(10)
-"""Angle from upright within which the pendulum counts as up [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -390,33 +448,6 @@ class Ascent:
     def _changes(self, before: float, after: float) -> tuple[float, ...]:
         at = np.flatnonzero((self.mode[:-1] == before) & (self.mode[1:] == after)) + 1
         return tuple(self.trial.t[at].tolist())
-
-
-def swing_up(
-    rig: Rig,
-    law: SwingUp,
-    *,
-    seconds: float = 10.0,
-    start: ArrayLike | None = None,
-    pushes: ArrayLike | None = None,
-) -> Ascent:
-    """Let a law swing a rig's pendulum up from where it hangs.
-
-    Parameters
-    ----------
-    rig : Rig
-        As it truly is.
-    start : array, shape (states,), optional
-        Where the rig is when the law is switched on; at rest, hanging, when omitted.
-    pushes : array, shape (T,), optional
-        What disturbs the drive, added to the command before its limit.
-    """
-    x0 = rig.plant.state("hanging") if start is None else np.asarray(start, dtype=np.float64)
-    rule = law.rule(rig, x0)
-    run = trial(
-        rig, rule, at="inverted", start=x0 - rig.plant.state("inverted"), seconds=seconds, pushes=pushes
-    )  # fmt: skip
-    return ascent_of(run, law, rule)
 
 
 def ascent_of(run: Trial, law: SwingUp, rule: Rule) -> Ascent:

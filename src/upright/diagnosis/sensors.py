@@ -57,7 +57,10 @@ def _dead(case: Case) -> Iterator[Finding]:
             severity="fault" if sure else "note",
             sentence=f"'{c.name}' reads {c.low:g} from the first to the last sample"
             + (f" although {why}: the sensor is dead, or the body was clamped." if sure else "."),
-            evidence={"samples [1]": float(case.inspection.time.samples), "value [1]": c.low},
+            evidence={
+                "samples [1]": float(case.inspection.time.samples),
+                f"value [{column_unit(c) or '1'}]": c.low,
+            },
             advice="Check plug and cable; if the body was clamped, say so." if sure else "Leave it out.",
             key=f"locked = [\"{named[c.name]}\"]" if c.name in named else "",
             panels=case.over_time(*(o.name for o in others[:1]), c.name),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import Field, dataclass, fields, replace
+from dataclasses import MISSING, Field, dataclass, fields, replace
 from inspect import get_annotations
 from keyword import iskeyword
 from typing import Any, ClassVar, Self, dataclass_transform
@@ -95,6 +95,17 @@ class Statement:
             cls._base = cls
         else:  # parameters that several plants share
             _as_dataclass(cls)
+
+    def __new__(cls, *_: Any, **given: Any) -> Self:
+        """Answer for a misspelt parameter; copies are made without any."""
+        known = {f.name: f for f in fields(cls)} if given else {}  # type: ignore[arg-type]
+        for name in given.keys() - known.keys():
+            raise BadInput(f"{cls.__name__} has no parameter '{name}'; {nearest(name, known)}")
+        missing = [n for n, f in known.items() if f.default is MISSING and n not in given]
+        if missing:
+            needed = "; ".join(f"{n}, {cls.quantity(n).meaning} [{cls.quantity(n).unit}]" for n in missing)
+            raise BadInput(f"{cls.__name__} also needs {needed}.")
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         for name, what in quantities(self).items():

@@ -7,6 +7,7 @@ import time as clock
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from upright.realtime.interrupts import ENDING, ignoring
 from upright.realtime.pace import Pace, Virtual
 from upright.rigs.board import SENTENCES, fault_text
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, Mode, Tick
-from upright.rigs.supervisor import Supervisor
+from upright.rigs.supervisor import BRAKING, Supervisor
 
 PATIENCE = 120.0
 """How long a person may take to bring the rig where it is to be held [s]."""
@@ -125,7 +126,6 @@ class RunEnd:
         Of the log.
     log_message : str
         What is wrong with the log, as a sentence.
-    events : tuple of (float, str, str)
     warning : str
         About the priority that the loop got.
     seconds : float
@@ -205,6 +205,7 @@ def carry_out(
         end["warning"] = warning
         if about.paced and not about.virtual:
             beside.clock = clock.monotonic
+        beside.braked = partial(_braked, hear.log, beside, order)
         beside.start(order.mode)
         stage.let_go()
         _loop(order, beside, ticking, hear.log, show, end)
@@ -263,13 +264,19 @@ def _exchanged(beside: Supervisor, command: float) -> Tick:
 
 
 def _row(
-    log: LogWriter, beside: Supervisor, tick: Tick, following: Tick, command: float, references: tuple[float, ...]
+    log: LogWriter, beside: Supervisor, tick: Tick, following: Tick, command: float, references: tuple[float, ...],
+    mode: int | None = None,
 ) -> None:  # fmt: skip
     """Sample, what was followed, the answer, and what of that the converter put out."""
     log.row(
         (tick.time, tick.tick, *tick.counts, *beside.readings(tick), *references, command, following.applied,
-         int(tick.mode), int(tick.faults))
+         int(tick.mode) if mode is None else mode, int(tick.faults))
     )  # fmt: skip
+
+
+def _braked(log: LogWriter, beside: Supervisor, order: RunOrder, tick: Tick, following: Tick, command: float) -> None:
+    """The same while the run is braked."""
+    _row(log, beside, tick, following, command, beside.references if order.references else (), BRAKING)
 
 
 def _state(beside: Supervisor, tick: Tick, command: float, first: Tick, end: Mapping[str, Any]) -> RunState:
@@ -311,7 +318,8 @@ def _header(order: RunOrder, stage: Stage, law: Law | Rule) -> LogHeader:
     return LogHeader(
         rig=order.rig_text, law=as_values(law), coordinates=tuple(zip(about.coordinates, stage.units, strict=True)),
         command_unit=about.command_unit, period=about.period, references=order.references,
-        modes={int(m): m.name for m in Mode}, faults={int(f): text for f, text in SENTENCES.items()},
+        modes={int(m): m.name for m in Mode} | {BRAKING: "BRAKING"},
+        faults={int(f): text for f, text in SENTENCES.items()},
         driven=(int(Mode.HOST),), start=clock.time(),
     )  # fmt: skip
 

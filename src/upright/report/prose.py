@@ -30,7 +30,7 @@ A template is Jinja's over Markdown as far as a chapter has it::
     - What to do. `command`
 
 ``*name* [unit]`` in a cell is a `Symbol`, a column in the middle (``:-:``) holds badges; ``![...](name)`` draws a
-picture and ``[name]`` sets a block (or several) that the code hands over.
+picture, ``[name]`` sets blocks and ``## [name]`` whole parts that the code hands over.
 A name that the template misspells is an error.
 """
 
@@ -58,7 +58,7 @@ _PLACED = re.compile(r"\[(\w+)\]")
 _PART = re.compile(r"(.*?)(?: \{(\w+)\})?")
 _STEP = re.compile(r"(.*?)(?: `(.*)`)?", re.S)
 
-Placed = Mapping[str, Sequence[Block]]
+Placed = Mapping[str, Sequence[Block | Part]]
 
 
 def chapter_of(
@@ -75,8 +75,8 @@ def chapter_of(
         Name of the template without its ending; the module's own when empty.
     figures : mapping of str to callable, optional
         Draws each picture that the template places.
-    placed : mapping of str to sequence of Block, optional
-        What the template sets by ``[name]``.
+    placed : mapping of str to sequence of Block or Part, optional
+        What the template sets by ``[name]`` and ``## [name]``.
     **values
         What the template computes its sentences from.
 
@@ -103,6 +103,8 @@ def chapter_of(
         heading, _, body = section.partition("\n")
         if heading.strip() == "Next":
             steps = tuple(_step(s) for p in _paragraphs(body) for s in _items(p))
+        elif named := _PLACED.fullmatch(heading.strip()):
+            parts += [p for p in (placed or {})[named[1]] if isinstance(p, Part)]
         else:
             parts.append(_part(heading.strip(), body, figures or {}, placed or {}))
     return Chapter(
@@ -116,15 +118,16 @@ def templates_of(package: str) -> Environment:
     """The templates beside the modules of a package, with the program's ways to write numbers as filters."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    templates = Environment(
+    templates: Any = Environment(  # its stubs know only its own filters and tests
         loader=PackageLoader(package, "."), undefined=StrictUndefined, finalize=_cell, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    templates.filters |= {
+    templates.filters.update({
         "number": number, "percent": percent, "symbol": plain, "typed": typed, "unit": unit, "fmt": format,
         "degrees": math.degrees, "in_percent": in_percent, "parameter": Symbol, "sentence": _sentence,
-    }  # fmt: skip
-    templates.tests |= {"finite": math.isfinite}
+        "capital": lambda text: f"{text[:1].upper()}{text[1:]}",
+    })  # fmt: skip
+    templates.tests.update({"finite": math.isfinite})
     return templates
 
 
@@ -171,11 +174,14 @@ def _part(heading: str, body: str, figures: Mapping[str, Callable[[], Any]], pla
     content: list[Block] = []
     for paragraph in _paragraphs(body):
         named = _PLACED.fullmatch(paragraph)
-        content += placed[named[1]] if named else [_block(paragraph, figures)]
+        new = placed[named[1]] if named else (_block(paragraph, figures),)
+        content += [b for b in new if not isinstance(b, Part)]
     return Part(match[1], tuple(content), folded=match[2] == "folded", aside=match[2] == "aside")
 
 
 def _block(text: str, figures: Mapping[str, Callable[[], Any]]) -> Block:
+    if "![" in text[1:]:
+        raise ValueError(f"a picture needs a blank line before it: {text}")
     if text.startswith("|"):
         return _table(text)
     if text.startswith("- "):

@@ -49,10 +49,18 @@ UNSEEING = Fault.ENCODER | Fault.MODEL | Fault.STALE | Fault.LINK | Fault.RESET
 """Faults after which the readings do not tell whether the rig still moves; a board that starts anew counts anew."""
 
 Event = Callable[[float, str, str], None]
+Braked = Callable[[Tick, Tick, float], None]
+"""Called with a sample while a run is braked, the next one, and the command in between."""
+BRAKING = 100
+"""Mode of such a row in a log: the supervisor commands, and not the law."""
 
 
 def unheard(_t: float, _kind: str, _text: str) -> None:
     """Events of a fault."""
+
+
+def unlogged(_sample: Tick, _next: Tick, _command: float) -> None:
+    """Samples of a run that is braked."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,6 +109,8 @@ class Supervisor:
         Called at every tick; answers why to stop, or an empty text.
     clock : callable or None
         The host's own time [s], with which the board's is compared; None where the board's is virtual.
+    braked : callable
+        Called while a run is braked, see `Braked`; whatever it raises ends that.
     """
 
     rig: LiveRig
@@ -108,6 +118,7 @@ class Supervisor:
     event: Event = unheard
     stopped: Callable[[], str] = field(default=lambda: "")
     clock: Callable[[], float] | None = None
+    braked: Braked = unlogged
     about: Capabilities = field(init=False)
     held: Limits = field(init=False)
     law: Law | Rule = field(init=False)
@@ -387,9 +398,11 @@ class Supervisor:
                 momentum = braking.momentum(self._passed, alone=alone)
                 if self.stopped() or not braking.goes_on(momentum, first):
                     return
-                tick = self.rig.exchange(braking.command(momentum))
+                command = braking.command(momentum)
+                tick = self.rig.exchange(command)
                 if tick.faults or tick.mode != Mode.HOST or tick.tick <= last.tick:
                     return
+                self.braked(last, tick, command)
                 last = tick
                 self._passed.append([q - target for q, target in zip(self.readings(tick), self.target, strict=True)])
 

@@ -176,11 +176,7 @@ def lab(
     shared = Workers.of(workers)
     requested = _requested(texts(experiment), itself, quick=quick)
     beside = Path() if out is None else at
-    live = (
-        _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept or "")
-        if itself
-        else None
-    )
+    live = _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept) if itself else None
     rig = rig if live is None else typed(live.file.path)
     laboratory.chosen_experiments(requested, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
@@ -225,7 +221,7 @@ def _requested(experiments: Sequence[str], itself: bool, *, quick: bool) -> Sequ
 def _live(
     rig: str, folder: Path, ask: Callable[[str], bool] | None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, nonideal: bool, alone: bool,
-    accept: str,
+    accept: str | None,
 ) -> LiveStand:  # fmt: skip
     """The rig of a RIG.toml; what it cannot do is reported first."""
     from upright.experiments.stand.live import live_stand, nobody, nobody_watches
@@ -300,11 +296,11 @@ def reproduce(
         Of a `Reproduced`.
     """
     from upright.paper.chapter import chapter
-    from upright.paper.reproduce import reproduce as again
+    from upright.paper.reproduce import reproduce_tables
     from upright.rig.makes import NOMINAL
 
     at = folder_if_given(out, pdf)
-    result = again(NOMINAL, seed)
+    result = reproduce_tables(NOMINAL, seed)
     page = chapter(result)
     return Answer(result, page, [] if at is None else write_page(page, at / "reproduce.html", pdf))
 

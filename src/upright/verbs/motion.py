@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput, nearest
 from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
-from upright.records import Provenance, Record
+from upright.records import Record
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
-from upright.verbs.linear.motion import motion_of_linear
+from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin
 
 if TYPE_CHECKING:
     from upright.rig import Rig
@@ -47,7 +47,8 @@ def simulate(
     seconds : float or str
         Length of the motion [s], or as ``"2 s"``.
     at : str, optional
-        Equilibrium; the one that gains or law are for, else the plant's first.
+        Equilibrium; the one that gains or law are for, else the plant's first. Gains that are for none, an array too,
+        need it of a plant that has several.
     u : float, callable of time, or array, shape (N,) or (N, inputs), optional
         Command, in the unit of the input or of the rig's command; it is added to the law's.
     dt : float or str, optional
@@ -111,13 +112,15 @@ def simulate(
         counts = {n: rig.hardware.value(key, 0.0) for n, key in stated.items() if key in rig.hardware.entries}
     steps = _steps(plant, counts)
     loop = _loop(plant, law, point, dt, memory, largest, steps)
+    if loop is not None:
+        _check_named(plant, law, at)
     if rig is not None and isinstance(loop, Law):  # late and rounded as the rig is, once
         loop = replace(loop, delay=0.0, resolution=steps, command_resolution=rig.converter)
     if rig is not None and not isinstance(law, Gains | Law | Rule | None):
         _check_gains(rig, np.atleast_2d(np.asarray(law, dtype=np.float64)), point)
     command = _command(u, t, len(plant.inputs))
     x = motion(plant, drive, x0, command, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
-    _check_bounded(t, x[:, : len(names)], names)
+    check_bounded(t, x[:, : len(names)], names, ", so this loop does not stabilize the plant")
     signals = {name: x[:, i] for i, name in enumerate(names)}
     put_out = x[:, len(names) :] if loop is not None else command
     commands = {}
@@ -127,8 +130,7 @@ def simulate(
         t=t, signals=signals | commands,
         units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
         inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
-        provenance=Provenance(reader="simulation", rig=type(plant).__name__,
-                              notes=("This log was simulated; no rig was touched.",)),
+        provenance=simulated_origin(type(plant).__name__),
     )  # fmt: skip
 
 
@@ -173,17 +175,6 @@ def _check_gains(rig: Rig, K: Array, point: Mapping[str, float]) -> None:
         )
 
 
-def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
-    """Refuse a motion that left all bounds."""
-    wild = ~(np.abs(x) < 1e15)
-    if wild.any():
-        k = int(np.argmax(wild.any(axis=1)))
-        raise BadInput(
-            f"the motion grows without bound: {names[int(np.argmax(wild[k]))]} is beyond 1e15 at {t[k]:.4g} s, so this "
-            "loop does not stabilize the plant; change its gains or its start, or simulate fewer seconds."
-        )
-
-
 def _rig(source: Any) -> Rig | None:
     """A rig, or that of a fit; a plant alone has no drive."""
     from upright.rig import Rig
@@ -220,6 +211,16 @@ def _point(plant: Plant, law: Any, at: str | None) -> dict[str, float]:
             f'there, .linear("{at}"), or pass the bare array to run it all the same.'
         )
     return wanted
+
+
+def _check_named(plant: Plant, law: Any, at: str | None) -> None:
+    """Refuse gains that say nothing of their equilibrium where nobody names it and there are several."""
+    if at is None and len(plant.equilibria) > 1 and not isinstance(law, Law | Rule) and _own_point(plant, law) is None:
+        named = " or ".join(f'at="{name}"' for name in plant.equilibria)
+        raise BadInput(
+            f"these gains do not say about which equilibrium they hold; say {named}. Those that up.place(plant.linear("
+            "...), poles) gives know theirs."
+        )
 
 
 def _own_point(plant: Plant, law: Any) -> dict[str, float] | None:
@@ -292,15 +293,10 @@ def _loop(
 ) -> Law | Rule | None:
     if law is None or isinstance(law, Law | Rule):
         return law
-    try:
-        K = np.atleast_2d(np.asarray(law, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise BadInput(
-            f"simulate closes the loop by gains, a Law or a Rule, got {type(law).__name__}; up.place makes gains."
-        ) from None
-    wanted = (len(plant.inputs), len(plant.state_names()))
-    if K.shape != wanted:
-        raise BadInput(f"gains for {type(plant).__name__} need shape {wanted}, got {K.shape}.")
+    K = read_gains(
+        law, (len(plant.inputs), len(plant.state_names())), type(plant).__name__,
+        f"simulate closes the loop by gains, a Law or a Rule, got {type(law).__name__}; up.place makes gains.",
+    )  # fmt: skip
     target = np.array([point[c.name] for c in plant.coordinates])
     return state_feedback(K, dt, memory=memory, target=target, limit=limit, resolution=steps)
 

@@ -1,9 +1,13 @@
 """Does the experiment find the twin's numbers, say what it cannot know, and notice a rig out of level?"""
 
 import math
+import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from tests.report.rendering import Rendered
 from upright.experiments.free_swing_4 import chapter as release_page
 from upright.experiments.free_swing_4.release import TILT, freed
 from upright.experiments.free_swing_4.run import (
@@ -14,7 +18,8 @@ from upright.experiments.free_swing_4.run import (
     run_free_swing,
     write_questions,
 )
-from upright.report.html import write_html
+from upright.experiments.stand.known import Known
+from upright.report.html import WORDS_OF_A_VERDICT, sentences, write_html
 from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
@@ -91,13 +96,43 @@ def page(done):
     return write_html(done.folder / "report.html", release_page.chapter(done)).read_text(encoding="utf-8")
 
 
+def test_every_sentence_is_printed_for_some_result(done):
+    free, blind = done.answers["free_swing"], done.answers["no_scale"]
+    silent = replace(blind, fit=replace(blind.fit, unseen=(), directions=np.empty((0, 0))))
+    cart = replace(
+        done, rig=freed(make_rig("linear")), answers={}, weighed=Known(name="m_c", value=1.0, stderr=0.01),
+        drifts=tuple(replace(w, name=w.name.replace("out of level by 0.25°", "pushed")) for w in done.drifts),
+    )  # fmt: skip
+    template = Rendered(release_page.__name__)
+    with template.watched():
+        for result in (
+            done, cart, replace(done, answers={"free_swing": free, "no_scale": silent}),
+            replace(done, answers={}, drifts=(), balance=None, interrupted=True),
+        ):  # fmt: skip
+            release_page.chapter(result)
+    assert template.missed == {}
+
+
+def test_the_verdict_prints_the_shares_of_the_fit_and_counts_the_intervals_that_hold(done):
+    page = release_page.chapter(done)
+    (fitted,), (predicted,) = ([min(s.fit_percent.values()) for s in done.answers["free_swing"].fit.runs.values()
+                                if s.role == role] for role in ("fit", "predict"))  # fmt: skip
+    printed = [float(n) for n in re.findall(r"to ([\d.]+) % or better", page.verdict)]
+    assert printed == [pytest.approx(fitted, abs=0.005), pytest.approx(predicted, abs=0.005)]
+    inside = [low <= getattr(done.rig.plant, name) <= high for name, (low, high) in (
+        (n, p["interval"]) for n, p in page.numbers["parameters"].items())]  # fmt: skip
+    assert page.verdict.startswith(f"{sum(inside)} of {len(inside)} estimates agree with the true values")
+    said = f"{page.title} {page.question} {page.verdict} {page.first_line}"
+    assert len(said.split()) <= WORDS_OF_A_VERDICT
+
+
 def test_the_page_tells_it_all_without_leaving_the_page(done):
     text = page(done)
-    for needed in ("Why the disk wanders", "scale together", "0.25°", "<math", "upright identify"):
+    for needed in ("Why the disk wanders", "they scale together", "0.25°", "<math", "upright identify"):
         assert needed in text
     assert "http" not in text.replace("http-equiv", "")
     assert len(text) < 2_000_000
-    assert release_page.chapter(done).verdict in text
+    assert all(sentence in text for sentence in sentences(release_page.chapter(done).verdict))
 
 
 def test_a_cart_s_pendulum_is_found_too(tmp_path):

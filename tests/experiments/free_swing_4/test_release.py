@@ -183,11 +183,11 @@ def test_the_chapter_says_how_fast_the_twin_would_fall_and_what_is_known_of_it(m
     done = FreeSwing(rig=rig, folder=tmp_path)
     told = chapter(done)
     twin, known = told.parts[0].content
-    assert twin.startswith(f"A digital twin of {rig.name}, seed 3: ")
-    assert f"fall so at {pole:#.4g} rad/s." in twin
-    assert ("drive belt off" if body == "disk" else "motor silent, pulled along by the cart") in twin
+    assert twin.startswith(f"The rig is a digital twin of {rig.name}, seed 3.")
+    assert f"falls with {pole:#.4g} 1/s (unstable pole)." in twin
+    assert ("The drive belt is off" if body == "disk" else "The motor is silent, pulled along by the cart") in twin
     assert f"the {body}'s inertia to 1 %, the lengths from a ruler" in known
-    assert f"why does the {body} wander" in told.question
+    assert f"Why does the {body} wander" in told.question
     assert told.verdict == "The experiment was stopped before the first fit."
     assert not told.sound
     weighed = replace(done, weighed=Known(name="J_d", value=1e-3, stderr=1e-6))
@@ -198,7 +198,7 @@ def test_the_chapter_says_how_fast_the_twin_would_fall_and_what_is_known_of_it(m
     ("make", "case", "ends", "sentence"),
     [
         ("furuta", "out of level by 0.25°", (-math.pi / 3, math.pi / 90),
-         "That lean drags the free disk away by 60°; a soft spring keeps it within 2°."),
+         "A lean of 0.25° drags the free disk away by 60°; a soft spring keeps it within 2°."),
         ("linear", "pushed at release", (0.031, -0.004),
          "A push of 0.05 m/s at the release leaves the cart 3.1 cm away, where dry friction holds it; a soft spring "
          "brings it back to 0.4 cm."),
@@ -220,7 +220,7 @@ def test_the_chapter_says_how_far_a_carrier_went_and_what_the_spring_makes_of_it
     done = FreeSwing(rig=freed(make_rig(make)), folder=tmp_path, drifts=drifts)
     assert chapter(done).detail == sentence
     assert chapter(replace(done, interrupted=True)).detail == (
-        f"Interrupted: this is what was there by then. {sentence}"
+        f"Interrupted: this is what was finished by then. {sentence}"
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -225,6 +226,21 @@ def test_a_large_swing_with_overtones_is_explained_by_the_equations_of_motion():
     plant = CartPendulum(m_c=m_c, m_p=m_p, l_cg=l_cg, J_p=J_p, b_1=b_1, b_2=b_2, g=g)
     found = Balance(plant=CartPendulum, at="hanging", data=data).response(plant.parameters())[0]
     np.testing.assert_allclose(found, data.response, rtol=1e-7)
+
+
+@pytest.mark.parametrize("kept", [0, 1])
+def test_a_wide_swing_of_one_frequency_is_explained_alike_beside_a_line_that_is_silent(kept):
+    """Driven together with a second frequency at which nothing moves, a sine has the response that it has alone."""
+    omega = np.array([1.4, 2.1])
+    single = replace(smooth(omega=omega[[kept]]), drive=np.array([0.2]))
+    silent = np.where(np.arange(2) == kept, 0.2, 1e-12)
+    both = replace(smooth(omega=omega), drive=silent, together=True)
+    values = {**FURUTA.parameters(), "actuator.gain": 0.65}
+    alone = Balance(plant=Furuta, at="hanging", data=single).response(values)[0, 0]
+    beside = Balance(plant=Furuta, at="hanging", data=both).response(values)[0, kept]
+    assert beside == pytest.approx(alone, rel=1e-5)  # products of more than six overtones are left out
+    small = Balance(plant=Furuta, at="hanging", data=replace(single, drive=np.array([1e-6]))).response(values)[0, 0]
+    assert abs(alone - small).max() > 1e-3 * abs(small).max()
 
 
 def test_both_ways_recover_a_smooth_rig_from_bad_guesses():

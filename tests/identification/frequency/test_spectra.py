@@ -347,3 +347,40 @@ def test_the_sign_of_a_speed_is_told_by_where_the_motion_turns() -> None:
     far = np.where((at > low + 1.0) & (at < high - 0.1), 1.0, -1.0)
     assert sign_line(t, y, omega, far) is None
     assert sign_line(t[::120], y[::120], omega, rough) is None
+
+
+EXCITED = {
+    "sines": lambda: (stepped(noise=0.01, overtone=0.02),),
+    "multisine": lambda: (periodic(noise=0.02, extra=0.02)[0],),
+    "sweep": lambda: tuple(swept(seed, 0.2) for seed in range(4)),
+}
+
+
+@pytest.mark.parametrize("kind", EXCITED)
+def test_a_response_depends_on_units_as_a_ratio_does_and_neither_on_the_clock_nor_on_a_mirror(kind: str) -> None:
+    """Readings eight times as large under a command of half the size: 16 times the response, 256 times its variance.
+
+    One unit of Coulomb friction comes to an eighth of the viscous one at eight times the speed. Powers of two round
+    nothing, so that only the clock's own rounding is left. In a mirror a sine is cut half a period later.
+    """
+    logs = EXCITED[kind]()
+    here = told(*logs)
+    mirrored = [(-1.0, -1.0, 0.0)] if kind != "sines" else []
+    for y, u, start in ((8.0, 0.5, 0.0), (1.0, 1.0, 1024.0), *mirrored):
+        there = told(*(
+            Record(
+                t=start + log.t, signals={"u": u * log["u"], "y": y * log["y"]}, units={n: UNITS[n] for n in "uy"},
+                provenance=log.provenance,
+            )
+            for log in logs
+        ))  # fmt: skip
+        times = y / u
+        assert there.omega == pytest.approx(here.omega, rel=1e-9)
+        assert there.response == pytest.approx(times * here.response, rel=1e-6)
+        assert there.variance == pytest.approx(times**2 * here.variance, rel=1e-4)
+        assert np.abs(there.drive) == pytest.approx(np.abs(u * here.drive), rel=1e-6)
+        assert there.dry == pytest.approx(here.dry / abs(y), rel=1e-6)
+        for name in ("coherence", "distortion", "still"):
+            assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-4, abs=1e-9)
+        assert there.overtones == pytest.approx(y * here.overtones, rel=1e-5, abs=1e-9)
+        assert (there.notes, there.together, there.hold) == (here.notes, here.together, pytest.approx(here.hold))

@@ -330,8 +330,20 @@ def test_the_size_of_a_number_assumed_to_be_none_is_what_shows_as_much_as_the_mo
     assert a.size == pytest.approx(np.linalg.norm(J, axis=0).max() / np.linalg.norm(damper), rel=1e-3)
     moves = -np.linalg.lstsq(J, damper, rcond=None)[0] * a.size
     assert list(a.follows.values()) == pytest.approx(moves, abs=2e-3)
+    assert a.range == (-a.size, a.size)  # a damper that nobody measured may drive as well
     assert assumptions(best, {}, evaluate=False)[0].size == 0.0
     assert all(math.isnan(v) for v in assumptions(best, {}, evaluate=False)[0].follows.values())
+
+
+@pytest.mark.parametrize(
+    ("value", "bounds", "expected"),
+    [(2.0, {}, (0.2, 20.0)), (2.0, {"upper": 3.0}, (0.2, 3.0)), (2.0, {"lower": 1.0, "upper": 3.0}, (1.0, 3.0))],
+)
+def test_an_assumed_number_may_be_ten_times_as_large_or_small_or_lie_within_its_bounds(value, bounds, expected) -> None:
+    rig = cart("k_1", assumed="m_1", m_1=value)
+    parameters = {**rig.parameters, "m_1": replace(rig.parameters["m_1"], **bounds)}
+    (a,) = assumptions(fitted(replace(rig, parameters=parameters)), {})
+    assert a.range == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("factor", "told"), [(1.09, False), (1.11, True)])

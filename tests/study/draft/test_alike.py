@@ -30,10 +30,13 @@ COLUMNS = {"psi": SEEN.columns[0], "theta": SEEN.columns[1]}
 def told(monkeypatch):
     """What is taken instead of a Furuta pendulum of two angles, and said, when the accelerations are explained so."""
 
-    def sentence(shares: dict[str, float], columns=COLUMNS, plant: str = "furuta", **more) -> tuple[str, list[str]]:
+    def sentence(
+        shares: dict[str, float], columns=COLUMNS, plant: str = "furuta",
+        suits=("furuta", "torsional-2", "double-pendulum"), **more,
+    ) -> tuple[str, list[str]]:  # fmt: skip
         monkeypatch.setattr(module, "explained", lambda *_: dict(sorted(shares.items(), key=lambda item: -item[1])))
         monkeypatch.setattr(module, "draft", lambda *_, **__: "")
-        monkeypatch.setattr(module, "plants_that_suit", lambda *_: ("furuta", "torsional-2", "double-pendulum"))
+        monkeypatch.setattr(module, "plants_that_suit", lambda *_: suits)
         return alike(RECORD, SEEN, shown(plant, columns, **more))
 
     return sentence
@@ -66,6 +69,12 @@ def test_columns_called_as_the_coordinates_are_believed_and_the_better_plant_is_
     assert instead == ""
     assert said.startswith("Taken for furuta by its columns. Of the accelerations it explains 30 %, torsional-2 97 %,")
     assert said.endswith("--plant torsional-2 drafts what explains them far better.")
+
+
+def test_a_plant_that_its_columns_could_only_be_of_is_not_compared(told):
+    assert told({"furuta": 0.9}, suits=("furuta",)) == ("", [])
+    counted = {name: replace(c, guess="counts") for name, c in COLUMNS.items()}
+    assert told({"furuta": 0.9}, counted, suits=("furuta",)) == ("", [])
 
 
 def test_where_nothing_can_be_explained_the_columns_are_all_there_is(told):

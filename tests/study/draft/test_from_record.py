@@ -8,8 +8,9 @@ import pytest
 from tests.identification.twins import PENDULUM, swing
 from upright.errors import BadInput
 from upright.identification import identify
-from upright.physics import Furuta, Pendulum
+from upright.physics import CartPendulum, Furuta, Pendulum
 from upright.records import Provenance, Record
+from upright.rig import Rig
 from upright.study.draft.from_record import study_of_record
 
 
@@ -138,3 +139,18 @@ def test_a_plant_of_ones_own_takes_columns_of_its_coordinates_names() -> None:
         BadInput, match=r'Own moves in theta, .* columns phi; say which is which: columns=\{"theta": "phi"\}'
     ):
         study_of_record(Record(t=T, signals={"phi": SWING}), Own, known=KNOWN)
+
+
+@pytest.mark.parametrize("gain", [1.0, 2.5])
+def test_a_study_of_a_known_rig_has_its_gain_whatever_that_is(gain: float) -> None:
+    """A gain of 1 N/V is one, and no matter of course: only forces themselves need none."""
+    t = 0.01 * np.arange(800)
+    record = Record(
+        t=t, signals={"x": 0.1 * np.sin(3 * t), "theta": 0.2 * np.cos(5 * t), "u": np.sign(np.sin(2 * t))},
+        units={"x": "m", "theta": "rad", "u": "V"}, provenance=Provenance(file="log.csv", reader="table"),
+    )  # fmt: skip
+    plant = CartPendulum(m_c=0.5, m_p=0.1, l_cg=0.2, J_p=1e-3)
+    rig = Rig.known(plant, gain=f"{gain} N/V", limit="10 V", period="10 ms", counts=4096)
+    study = study_of_record(record, rig, columns={"drive": "u"})
+    assert study.model.parameters["actuator.gain"].value == gain
+    assert study.rig.gain == gain

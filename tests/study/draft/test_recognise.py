@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.physics import CartPendulum, Furuta
+from upright.physics import BUILT_IN, CartPendulum, Furuta, find
 from upright.readers import inspect
 from upright.readers.inspection import Column, Inspection
 from upright.readers.resolution import Resolution
@@ -21,6 +21,7 @@ from upright.study.draft.recognise import (
     in_dac_counts,
     moves_against,
     moving_window,
+    named_after,
     plant_of,
     position_columns,
     recognise,
@@ -288,6 +289,17 @@ def test_zero_is_where_a_body_lay_before_the_command(x, u, guess, hangs, window,
     assert read == pytest.approx(last if zero == "rest" else zero, abs=0.021 if hangs else 1e-12)
 
 
+@pytest.mark.parametrize("idle", [0, 60])
+def test_an_arm_that_may_stand_anywhere_is_zero_where_it_begins_and_not_where_a_drive_took_it(idle: int) -> None:
+    """A pendulum that swings freely moves the arm before the first command, and the drive turns it by whole turns."""
+    t = 0.01 * np.arange(1000)
+    arm, pendulum = 0.3 * np.sin(6 * t) - 4.0 * t, 0.5 * np.cos(6 * t)
+    u = np.where(np.arange(1000) < idle, 0.0, np.sign(np.sin(2 * t)))
+    record = log(inputs=("u",), u=u, psi=arm, theta=pendulum)
+    found = recognise(record, inspect(record), "furuta")
+    assert found.rest["psi"] == 0.0
+
+
 RAMP = np.arange(1000.0)
 
 
@@ -481,3 +493,14 @@ def test_a_log_in_which_nothing_moves_names_its_file_and_what_to_look_at():
     record = log(alpha=0 * T)
     with pytest.raises(BadInput, match="no column moves like an angle, a position or a count; `upright show`"):
         recognise(record, inspect(record))
+
+
+@pytest.mark.parametrize("plant", BUILT_IN)
+def test_columns_are_named_after_the_one_plant_on_a_driven_body_that_has_just_these_coordinates(plant):
+    """Carts, disks and links share their names with each other, a single angle is called theta by everybody."""
+    own = [c.name for c in find(plant).coordinates]
+    named = plant if plant in ("cart-pendulum", "furuta") else ""
+    assert named_after([col(name) for name in own]) == named
+    assert named_after([col(f"{name} (rad)") for name in reversed(own)]) == named
+    assert named_after([col(name) for name in (*own, "delta")]) == ""
+    assert named_after([col(name) for name in own[:1]]) == ""

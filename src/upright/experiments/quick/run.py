@@ -15,6 +15,7 @@ from upright.control.sensors import SURE
 from upright.control.swing_up import Ascent, ascent_of
 from upright.control.trial import SUBSTEPS
 from upright.control.wiring import WiringCheck, check_wiring
+from upright.errors import BadInput
 from upright.experiments.stand.fits import fit_study
 from upright.experiments.stand.live import LiveStand
 from upright.experiments.stand.stand import APPLIED, file_of
@@ -37,8 +38,6 @@ UP = 14.0
 """Time for the way up and for holding [s]."""
 HELD = 3.0
 """How long it must stand at the end to be called upright [s]."""
-OF_TRAVEL = 0.8
-"""Share of the travel at which the law itself switches off, so that the body coasts within it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,13 +54,13 @@ class QuickRun:
         As identified.
     study, fit : Study, Fit or None
     law : SwingUp or None
-    share : float
-        Of the rigs that the fit allows, how many are caught in simulation.
+    share : float or None
+        Of the rigs that the fit allows, how many are caught in simulation; None where no law was designed.
     ascent : Ascent or None
-    ended : str
+    ended : str or None
         Why the swing-up ended early.
-    refused : str
-        Why a loop was not closed; empty where it was.
+    refused : str or None
+        Why a loop was not closed.
     seconds : float
         At the rig, by its own clock [s].
     """
@@ -75,10 +74,10 @@ class QuickRun:
     study: Study | None = None
     fit: Fit | None = None
     law: SwingUp | None = None
-    share: float = 0.0
+    share: float | None = None
     ascent: Ascent | None = None
-    ended: str = ""
-    refused: str = ""
+    ended: str | None = None
+    refused: str | None = None
 
     @property
     def upright(self) -> bool:
@@ -130,7 +129,10 @@ def run_quick(
     known = read_stored_rig(folder / "fit.json", seed=seed)
     model = completed(known, vendor=stand.vendor, who="a minute at a rig", form="").replace(name=stand.rig.name)
     progress("designing", 0.8)
-    law = design_swing_up(model, travel=OF_TRAVEL * stand.travel)
+    try:
+        law = design_swing_up(model, travel=stand.travel, speeds=stand.speeds, seed=seed)
+    except BadInput as error:
+        return replace(result, study=study, fit=fit, model=model, refused=str(error).rstrip("."))
     share = caught(model, law, seed)
     result = replace(result, study=study, fit=fit, model=model, law=law, share=share)
     if share < ENOUGH:
@@ -148,7 +150,7 @@ def _study(stand: LiveStand, log: Record, mode: Array, check: WiringCheck, folde
     A dead zone that they show is estimated too.
     """
     more = {}
-    if check.dead_zone > SURE * check.dead_error:
+    if check.dead_zone is not None and check.dead_error is not None and check.dead_zone > SURE * check.dead_error:
         more = {"dead_zone": {"guess": f"{check.dead_zone:.6g} {stand.rig.unit}", "min": 0}}
     t, kicks, calms = log.t, np.flatnonzero(mode >= KICKS), np.flatnonzero(mode >= CALMS)
     runs = [

@@ -16,7 +16,7 @@ import numpy as np
 
 from upright.basis import SIMULATED
 from upright.control import SwingUp, design_swing_up, trial
-from upright.control.effort import RestEffort, rest_effort, shown
+from upright.control.effort import RestEffort, rest_effort
 from upright.control.score import FALLEN
 from upright.control.sensors import KNOWN, Scales, probe, scales, shown_by_encoders
 from upright.control.swing_up import Ascent, ascent_of
@@ -131,36 +131,6 @@ class SwingUpRun:
         """Whether it was caught and stands by a quiet command, whatever its model is worth."""
         return self.rest is not None and self.rest.quiet
 
-    @property
-    def verdict(self) -> str:
-        """What came of it, in a sentence or two."""
-        return self.model.basis.qualified(self._outcome())
-
-    def _outcome(self) -> str:
-        a, unit = self.ascent, self.model.unit
-        if a is None:
-            return f"No loop was closed. {self.check.verdict}"
-        far = f"{a.travel:.3g} of {self.law.travel:.3g} {self.model.plant.coordinates[0].unit}"
-        took = f"with at most {a.peak:.2g} of {self.law.limit:.3g} {unit} and {far} of travel"
-        if math.isfinite(a.tripped):
-            return f"The end of the travel switched the drive off after {a.tripped:.2f} s; allow more or pump less."
-        if not a.handovers:
-            return f"The pendulum was not caught in {float(a.trial.t[-1]):.3g} s, {took}; allow more time or travel."
-        if not self.caught:
-            return f"The pendulum did not stand for {HELD:g} s: it fell {len(a.falls)} times, {took}."
-        again = f" at the {len(a.handovers)}. catch" if len(a.handovers) > 1 else ""
-        return (
-            f"From hanging to upright in {a.up:.2f} s and {a.swings} half swings{again}, {took}; "
-            f"it stood to the end, {float(a.trial.t[-1]) - a.up:.3g} s.{self._holding()}"
-        )
-
-    def _holding(self) -> str:
-        """What holding takes, as a sentence after others."""
-        if self.rest is None:
-            return ""
-        excessive = "" if self.rest.quiet else " That is excessive effort: take finer encoders or slower differences."
-        return f" The command at rest {shown(self.rest, self.law.limit, self.model.unit)}.{excessive}"
-
 
 def known_of(identified: Rig) -> Mapping[str, float]:
     """Relative standard errors of a fit's numbers, from the rigs that it allows; friction as it may be on the day."""
@@ -260,7 +230,8 @@ def run_swing_up(
     """
     began = time.perf_counter()
     progress("designing swing-up and catch", 0.0)
-    law = design_swing_up(model, travel=travel)
+    room = stand.travel if travel is None and math.isfinite(stand.travel) else travel
+    law = design_swing_up(model, travel=room, speeds=stand.speeds)
     progress("asking the encoders", 0.3)
     command = probe(model, law)
     log = _coasted(stand, command, folder)

@@ -226,9 +226,11 @@ def _foresee(
     problem = formulate(rig, [before], stated=groups)
     x, log = problem.start, SearchLog(progress=progress)
     if x.size:
-        end = descend_progressively(problem, x, log, upto=upto)
+        # how the run begins is felt at once, and later a speed that is a little off has thrown the motion out of phase
+        early = min(track.period for track in problem.tracks) / 4
+        end = descend_progressively(problem, x, log, horizon=early, upto=upto)
         for other in _either_side(problem):
-            end = better(end, descend_progressively(problem, other, log, upto=upto))
+            end = better(end, descend_progressively(problem, other, log, horizon=early, upto=upto))
         if end.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh

@@ -31,6 +31,9 @@ motion: where nothing moves every model misses all of it."""
 MOSTLY = 50.0
 """Percent of such a signal that has to lie inside its band: what is far outside was not lost among little motion."""
 
+HALF = 50.0
+"""Fit percent below which a prediction says nothing to speak of, however well its band foretold that."""
+
 MARGIN = 2.0
 """Percent by which a model has to beat held speeds for its horizon to tell anything; one step ahead fits anything."""
 
@@ -139,10 +142,11 @@ def _predicts(evidence: Evidence) -> Judgement:
     if poor:
         against.append(f"The fitted runs are not explained ({', '.join(poor)}; {GOOD:.0f} % is the least).")
     still = _nearly_still(evidence.runs)
-    worse = [f"{what} {p:.1f} %" for what, p in _worse(evidence.runs).items() if what not in still]
+    spared = {*still, *_foretold(evidence.runs)}
+    worse = [f"{what} {p:.1f} %" for what, p in _worse(evidence.runs).items() if what not in spared]
     if worse:
         against.append(f"Runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)}).")
-    bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD and what not in still]
+    bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD and what not in spared]
     if bad and not worse:
         against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
     against += [s[0].upper() + s[1:] for s in evidence.conventions]
@@ -337,7 +341,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
     if no:
         answer, headline = "no", "Not all of them are determined."
     elif guessed:
-        answer, headline = "in part", f"As numbers of a plant that was guessed.{_and(ratios)}"
+        answer, headline = "in part", f"Only if the rig is the plant that was guessed.{_and(ratios)}"
     elif evidence.bent and not free:
         answer, headline = "no", "No number can be used before the drive's delay is estimated."
     elif reasons:
@@ -557,6 +561,18 @@ def _nearly_still(runs: Mapping[str, RunScore]) -> list[str]:
             if percent < GOOD and small and s.inside.get(signal, 100.0) >= MOSTLY:
                 out.append(f"{label} {signal}")
     return out
+
+
+def _foretold(runs: Mapping[str, RunScore]) -> list[str]:
+    """Predicted signals that fall short as far as their bands said: uncertain, and not refuted."""
+    expected = _expected(runs)
+    return [
+        f"{label} {signal}"
+        for label, s in runs.items()
+        if s.role == "predict"
+        for signal, inside in s.inside.items()
+        if HALF <= s.fit_percent[signal] < GOOD and inside >= FEWEST and expected.get(f"{label} {signal}", GOOD) < GOOD
+    ]
 
 
 def _expected(runs: Mapping[str, RunScore]) -> dict[str, float]:
