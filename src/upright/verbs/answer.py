@@ -63,7 +63,7 @@ class Answer(Generic[V]):
         return tuple(self._drawings())
 
     def plot(self, name: str | None = None) -> Any:
-        """The chapter's best picture, or the one called `name`, for a notebook: a matplotlib figure or a chart.
+        """The chapter's best picture, or the one called `name`: a matplotlib figure or a chart; SVG of a stored one.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class Answer(Generic[V]):
             raise BadInput(f"plot draws {', '.join(drawings)}, got '{name}'; {nearest(name, drawings)}")
         draw = drawings[name].draw
         if isinstance(draw, str):
-            raise BadInput(f"the picture '{name}' was stored as SVG; take it from .report(), or make it again.")
+            return StoredPicture(draw)
         return draw()
 
     def _drawings(self) -> dict[str, Picture]:
@@ -100,6 +100,14 @@ class Answer(Generic[V]):
         from upright.report.html import write_html
 
         return write_html(path, self.chapter)
+
+
+class StoredPicture(str):
+    """SVG of a picture that an earlier run drew; a notebook shows it."""
+
+    def _repr_svg_(self) -> str:
+        first, end, _ = self.removeprefix('<div class="chart">').partition("</svg>")  # of a chart that for a desk
+        return first + end
 
 
 def as_text(chapter: Chapter, files: Sequence[Path] = ()) -> str:

@@ -31,6 +31,7 @@ WIDTHS = {"wide": 640.0, "narrow": 330.0}
 _TEXT, _LETTER = 13.0, 7.4  # units of text and of one of its letters, on average and with room to spare
 _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN, _ROW = 50.0, 14.0, 20.0, 40.0, 8.0, 19.0
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_OFF = 0.1  # units by which a drawn curve may miss its samples: a tenth of a pixel
 _MANY = 12  # points of a line from which on their marks are small
 _MARKS = {
     "x": "M{l} {t}L{r} {b}M{l} {b}L{r} {t}", "+": "M{x} {t}V{b}M{l} {y}H{r}", "s": "M{l} {t}H{r}V{b}H{l}Z",
@@ -361,7 +362,7 @@ class _Drawing:
 
     def _line(self, line: ChartLine, x: Array, y: Array) -> None:
         if not line.mark:
-            for path in _pieces(x, y, thin=0.3):
+            for path in _pieces(x, y):
                 self._shape(path, line.colour, width=1.6, dash=line.dash)
             return
         points = [(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True) if math.isfinite(a + b)]
@@ -401,16 +402,29 @@ class _Drawing:
         )
 
 
-def _pieces(x: Array, y: Array, thin: float) -> Iterator[str]:
-    """Paths of a curve between its gaps, without points closer to the last one than `thin`."""
+def _pieces(x: Array, y: Array) -> Iterator[str]:
+    """Paths of a curve between its gaps, through those of its points that an eye would miss."""
     y = np.clip(y, -2000.0, 4000.0)  # what leaves the picture by far
     whole = np.isfinite(x) & np.isfinite(y)
     for piece in np.split(np.arange(x.size), np.flatnonzero(np.diff(whole.astype(np.int8))) + 1):
-        if piece.size < 2 or not whole[piece[0]]:
+        if piece.size > 1 and whole[piece[0]]:
+            kept = piece[_needed(x[piece], y[piece])]
+            yield "M" + "L".join(f"{x[i]:.1f} {y[i]:.1f}" for i in kept)
+
+
+def _needed(x: Array, y: Array) -> list[int]:
+    """Points without which a polygon would move by more than `_OFF` (Ramer, 1972; Douglas and Peucker, 1973)."""
+    needed, open_ends = {0, x.size - 1}, [(0, x.size - 1)]
+    while open_ends:
+        a, b = open_ends.pop()
+        if b - a < 2:
             continue
-        kept = [piece[0]]
-        for i in piece[1:-1]:
-            if abs(x[i] - x[kept[-1]]) + abs(y[i] - y[kept[-1]]) >= thin:
-                kept.append(i)
-        kept.append(piece[-1])
-        yield "M" + "L".join(f"{x[i]:.1f} {y[i]:.1f}" for i in kept)
+        along = np.array([x[b] - x[a], y[b] - y[a]])
+        long = float(np.hypot(*along))
+        dx, dy = x[a + 1 : b] - x[a], y[a + 1 : b] - y[a]
+        off = np.abs(along[0] * dy - along[1] * dx) / long if long > 0 else np.hypot(dx, dy)
+        if float(off.max()) > _OFF:
+            far = a + 1 + int(off.argmax())
+            needed.add(far)
+            open_ends += [(a, far), (far, b)]
+    return sorted(needed)
