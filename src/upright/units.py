@@ -12,41 +12,10 @@ from __future__ import annotations
 import math
 import re
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
-
-# Only what a rig needs: pint's full list reads "Nm" as a textile unit and "rev" not at all.
-_DEFINITIONS = """
-nano- = 1e-9 = n-
-micro- = 1e-6 = µ- = μ- = u-
-milli- = 1e-3 = m-
-centi- = 1e-2 = c-
-kilo- = 1e3 = k-
-mega- = 1e6 = M-
-meter = [length] = m = metre
-kilogram = [mass] = kg
-gram = 1e-3 * kilogram = g
-second = [time] = s = sec
-ampere = [current] = A = amp
-encoder_count = [count] = _ = count = counts
-radian = [] = rad
-degree = 0.017453292519943295 * radian = deg = °
-revolution = 6.283185307179586 * radian = rev = turn
-percent = 0.01 = pct
-minute = 60 * second = min
-hour = 3600 * second = h
-hertz = 1 / second = Hz
-revolutions_per_minute = revolution / minute = rpm
-newton = kilogram * meter / second ** 2 = N
-joule = newton * meter = J
-watt = joule / second = W
-volt = watt / ampere = V
-ohm = volt / ampere = Ω
-henry = volt * second / ampere = H
-inch = 0.0254 * meter = in
-pound = 0.45359237 * kilogram = lb
-"""
 
 _PLAIN = "1 % m mm cm um km in kg g mg lb s ms us min Hz kHz rad mrad deg rev counts N mN kN J W V mV A mA ohm H mH rpm"
 COMMON = (
@@ -198,7 +167,7 @@ def _registry() -> Any:
 
     nothing: Any = None  # not "", which stands for pint's full list
     registry: Any = pint.UnitRegistry(nothing, system=nothing)
-    registry.load_definitions(_DEFINITIONS.strip().splitlines())
+    registry.load_definitions(str(Path(__file__).with_suffix(".txt")))
     return registry
 
 

@@ -20,10 +20,10 @@ from upright.closed_loop.regression import (
     channels_of,
     columns,
     fit,
+    gains_of,
     held_out,
     law_of,
     refine,
-    scaled_least_squares,
     structure,
 )
 from upright.closed_loop.search import Search, extremes, held_for, stepped
@@ -219,7 +219,7 @@ def test_gains_of_columns_of_any_size_are_found_and_a_zero_column_gets_none():
     X = RNG.normal(size=(50, 3)) * [1e-9, 1.0, 1e9]
     X = np.column_stack([X, np.zeros(50)])
     gains = np.array([2e9, -3.0, 4e-9, 0.0])
-    assert scaled_least_squares(X, X @ gains) == pytest.approx(gains)
+    assert gains_of(X, X @ gains) == pytest.approx(gains)
 
 
 def test_what_rows_held_out_miss_is_judged_by_gains_of_the_others():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -49,3 +50,26 @@ def test_the_share_that_a_dead_zone_passes_is_its_first_harmonic():
 
 def test_no_dead_zone_keeps_up_no_cycle():
     assert loop()[1].dead_zone_cycle(0.0) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("dead_zone", [0.1, 0.4])
+def test_a_design_says_the_cycle_by_its_first_harmonic_beside_the_simulated_one(dead_zone):
+    """Both scale with the dead zone, as everything in a loop without another nonlinearity does."""
+    rig = RIG.replace(more={"actuator.dead_zone": dead_zone})
+    page = up.design(rig, poles=list(POLES), memory=0.2).chapter
+    text = next(block for part in page.parts if part.title == "The loop as it runs" for block in part.content
+                if isinstance(block, str))  # fmt: skip
+    said = text.partition(" The drive swallows ")[2].replace("±", "")
+    numbers = [float(n) for n in re.findall(r"(?<![\w.])\d+\.?\d*(?= V| rad/s)", said)]
+    swallowed, size, frequency, simulated, at = numbers
+    assert swallowed == dead_zone
+    amplitude, expected = loop()[1].dead_zone_cycle(dead_zone)
+    assert (size, frequency) == (pytest.approx(amplitude, rel=0.06), pytest.approx(expected, rel=0.06))  # two digits
+    # the bounds of harmonic balance above
+    assert simulated == pytest.approx(size, rel=0.15)
+    assert at == pytest.approx(frequency, rel=0.38)
+
+
+def test_a_design_for_a_drive_without_a_dead_zone_says_nothing_of_one():
+    page = up.design(RIG, poles=list(POLES)).chapter
+    assert "swallows" not in str(page.parts)

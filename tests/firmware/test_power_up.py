@@ -11,7 +11,9 @@ import upright as up
 from benchmarks.boards import plant
 from tests.firmware.test_laboratory import GAIN, RIG, STUDY, TRUTH
 from tests.firmware.test_pwm import MEGA_STEP, SUPPLY
+from upright.rigs.rigfile import read_rig_file
 from upright.running.doctor import check_up
+from upright.running.rig import model_and_truth
 
 KNOWN = STUDY.replace('gain = { guess = "0.5 N m/V", min = 0 }', f'gain = "{GAIN} N m/V"')
 for _guess, _true in (("8.5e-3", "7.1e-3"), ("5e-4", "6.1e-4"), ("3e-3 N", "2e-3 N"), ("2e-5 N", "4e-5 N")):
@@ -129,7 +131,7 @@ def test_nothing_is_switched_on_while_an_encoder_is_wrong(walked, wrong):
 
 
 @pytest.mark.slow
-def test_the_dead_zone_is_between_the_two_commands_that_it_tells(walked, request):
+def test_the_dead_zone_is_between_the_two_commands_that_it_tells(walked, request, tmp_path):
     checkup, _ = walked(dead=0.4)
     below, first = checkup.dead_zone
     # an edge of the PWM may be 8 cycles of 800 late in simavr, which is as much as 8 steps
@@ -137,6 +139,21 @@ def test_the_dead_zone_is_between_the_two_commands_that_it_tells(walked, request
     assert below - jitter - 1e-3 <= 0.4 <= first + jitter  # within a mV three counts do not show yet
     assert first <= 1.5 * below * (1 + 1e-9)
     assert checkup.sound, checkup.verdict
+    text = (tmp_path / "RIG.toml").read_text(encoding="utf-8")
+    assert text.startswith(RIG.partition("port")[0])  # the rest stays as its owner wrote it
+    model, _ = model_and_truth(read_rig_file(tmp_path / "RIG.toml"))
+    assert below <= model.more["actuator.dead_zone"] <= first  # its study knows of no dry friction
+
+
+@pytest.mark.slow
+def test_a_walk_with_the_dead_zone_written_finds_the_same_drive(host, tmp_path):
+    board = host(*plant(TRUTH.parameters(), GAIN), "dead=0.4")
+    (tmp_path / "study.toml").write_text(KNOWN, encoding="utf-8")
+    path = tmp_path / "RIG.toml"
+    path.write_text(RIG.format(port=board.port) + '[drive]\ndead_zone = "0.4 V"\n', encoding="utf-8")
+    found = check_up(path, hand=Maker(board), wait=lambda s: board.do(f"run {round(1e3 * s)}"), clear=True)
+    assert found.sound, found.verdict
+    assert found.dead_zone[0] <= 0.4 <= found.dead_zone[1]
 
 
 @pytest.mark.parametrize(("wrong", "counts"), [("flip 0", {"psi": -16000}), ("scale 1 0.5", {"theta": 8000})])

@@ -102,6 +102,7 @@ def test_a_bar_and_a_blank_line_in_a_value_part_nothing(module):
         ("# T\n\n{{ value.nothing }}\n", jinja2.UndefinedError, "nothing"),
         ("# T\n\n## P\n\n[nothing]\n", KeyError, "nothing"),
         ("# T\n\n## P\n\n![it](nothing) caption\n", KeyError, "nothing"),
+        ("# T\n\n## P\n\nText\n![it](nothing) caption\n", ValueError, "blank line before"),
         ("# T\n\n## P\n\n| a | b |\n|---|---|\n| 1 |\n", ValueError, "1 cells in a table of 2"),
     ],
 )

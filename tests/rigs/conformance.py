@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from upright.errors import RigStopped, UprightError
@@ -343,6 +344,26 @@ class Conformance:
         mad = replace(quiet_law(about), D=quiet_law(about).D * 1e9)
         with pytest.raises(RigStopped):
             rig.start(Mode.MCU, mad)
+        tick = rig.exchange(0.0)
+        assert Fault.GAINS in tick.faults
+        assert tick.applied == 0.0
+
+    @pytest.mark.parametrize("share", [0.99, 1.01])
+    def test_a_count_that_stays_may_not_become_the_whole_command(self, rig, share):
+        """An integrator that adds a hundredth of it in each of the 100 samples for which a count is held: no single
+        sample shows more than 1 %, and 1 % to either side of the bound is what float32 tells apart."""
+        about = opened(rig)
+        if Mode.MCU not in about.modes:
+            pytest.skip("it has no loop of its own")
+        rig.arm()
+        p, most = len(about.coordinates), limits_of(about).command
+        each = [share * most * abs(about.counts[0]) / 100, *[0.0] * (p - 1)]
+        adding = Law(np.eye(1), np.array([each]), np.ones((1, 1)), np.zeros((1, p)))
+        if share < 1:
+            rig.start(Mode.MCU, adding)
+            return
+        with pytest.raises(RigStopped, match=r"absurd|one that stays"):
+            rig.start(Mode.MCU, adding)
         tick = rig.exchange(0.0)
         assert Fault.GAINS in tick.faults
         assert tick.applied == 0.0

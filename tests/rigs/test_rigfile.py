@@ -215,9 +215,22 @@ def test_counts_are_written_where_nothing_else_changes_and_read_again(written, t
     assert path.read_text(encoding="utf-8").endswith("\n[loadings]\nadded = []\n")
 
 
+def test_a_dead_zone_is_written_beside_the_counts_and_read_in_the_command_s_unit(written):
+    path = written(WHOLE).with_counts({"psi": -2400.0})
+    read_rig_file(path).with_dead_zone("400 mV")
+    file = read_rig_file(path)
+    assert file.counts == {"psi": -2400.0}
+    assert file.dead_zone("V", 0.0) == pytest.approx(0.4)
+    file.with_dead_zone("0.3 V")
+    assert path.read_text(encoding="utf-8").count("dead_zone") == 1
+    assert read_rig_file(path).dead_zone("V", 0.0) == pytest.approx(0.3)
+    assert written(WHOLE).dead_zone("V", 0.7) == 0.7  # as it is described
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
+        ('kind = "twin"\nmake = "furuta"\n[drive]\ndead_zone = "1 V"\n', "line 3: .* has the drive that is described"),
         (WHOLE + "[counts]\npsi = 0\n", "line 15: counts per turn or metre are not zero"),
         ('kind = "twin"\nmake = "furuta"\n[counts]\npsi = 2400\n', "line 3: .* counts as it is described"),
     ],

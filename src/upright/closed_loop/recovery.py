@@ -56,7 +56,6 @@ class Recovery:
         Columns added to the law's output, and the factor on each.
     channels : tuple of Channel
         The law as a program writes it.
-    gains : mapping of str to Gain
     structure : str
         In words.
     rows : (K,) int array

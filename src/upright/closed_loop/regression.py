@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from upright.closed_loop.structures import Channel, Filter, On, joined, memory_before
 from upright.laws import Law
+from upright.signals.regression import LeastSquares
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -159,11 +160,9 @@ def held_out(n: int) -> Rows:
     return (np.arange(n) * BLOCKS // n) % 2 == 1
 
 
-def scaled_least_squares(X: Array, u: Array) -> Array:
-    """Solution of a regression whose columns are of any size; one that is zero everywhere gets no gain."""
-    size = np.sqrt(np.sum(X * X, axis=0))
-    safe = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.lstsq(X / safe, u, rcond=1e-13)[0]) / safe
+def gains_of(X: Array, u: Array) -> Array:
+    """Gains (p,) of columns of any size that come nearest a command; one that is zero everywhere gets none."""
+    return LeastSquares.of(X, u, rcond=1e-13).slopes
 
 
 def fit(signals: Signals, family: Family, u: Array, used: Rows, drop: frozenset[Term] = frozenset()) -> Regression:
@@ -181,16 +180,17 @@ def fit(signals: Signals, family: Family, u: Array, used: Rows, drop: frozenset[
 
     pole = pole_of(used, None)
     inside = at(pole_of(inner, pole))
-    gains = scaled_least_squares(inside.X[inner], u[inner])
+    gains = gains_of(inside.X[inner], u[inner])
     missed = float(np.sqrt(np.mean((u[outer] - inside.X[outer] @ gains) ** 2))) if outer.any() else math.inf
     made = at(pole)
     return Regression(
-        family=family, pole=pole, columns=made, gains=scaled_least_squares(made.X[used], u[used]), missed=missed
+        family=family, pole=pole, columns=made, gains=gains_of(made.X[used], u[used]), missed=missed
     )  # fmt: skip
 
 
 def bracket(at: Callable[[float], Columns], u: Array, rows: Rows) -> float:
-    """Best pole to about a thousandth: a coarse row of poles, then golden section around the best."""
+    """Best pole to about a thousandth: a coarse row of poles, then Brent's search around the best."""
+    from scipy.optimize import minimize_scalar
 
     def loss(pole: float) -> float:
         X = at(pole).X[rows]
@@ -202,20 +202,9 @@ def bracket(at: Callable[[float], Columns], u: Array, rows: Rows) -> float:
         return float(np.sum((u[rows] - X @ gains) ** 2))
 
     best = int(np.argmin([loss(p) for p in POLES]))
-    low, high = POLES[max(best - 1, 0)], POLES[best + 1] if best + 1 < len(POLES) else 0.9995
-    ratio = (math.sqrt(5) - 1) / 2
-    a, b = high - ratio * (high - low), low + ratio * (high - low)
-    fa, fb = loss(a), loss(b)
-    while high - low > 1e-3 * (1.001 - high):
-        if fa < fb:
-            high, b, fb = b, a, fa
-            a = high - ratio * (high - low)
-            fa = loss(a)
-        else:
-            low, a, fa = a, b, fb
-            b = low + ratio * (high - low)
-            fb = loss(b)
-    return (low + high) / 2
+    around = POLES[max(best - 1, 0)], POLES[best + 1] if best + 1 < len(POLES) else 0.9995
+    best_pole = minimize_scalar(loss, bounds=around, method="bounded", options={"xatol": 1e-3 * (1.001 - around[1])})
+    return float(best_pole.x)
 
 
 def refine(at: Callable[[float], Columns], u: Array, rows: Rows, pole: float) -> float:
@@ -223,14 +212,14 @@ def refine(at: Callable[[float], Columns], u: Array, rows: Rows, pole: float) ->
     best, loss = pole, math.inf
     for _ in range(12):
         made = at(pole)
-        gains = scaled_least_squares(made.X[rows], u[rows])
+        gains = gains_of(made.X[rows], u[rows])
         missed = u[rows] - made.X[rows] @ gains
         now = float(missed @ missed)
         if now >= loss * (1 - 1e-9):
             break
         best, loss = pole, now
         both = np.column_stack([made.X[rows], made.slope[rows] @ gains])
-        step = float(scaled_least_squares(both, u[rows])[-1])
+        step = float(gains_of(both, u[rows])[-1])
         pole = min(max(pole + step, 0.0), 0.9999)
     return best
 

@@ -49,7 +49,7 @@ def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = "."
         f"Period {1e3 * design.request.period:.4g} ms, command {design.sampled.delay:.3g} samples late "
         f"({_delay_from(design)}), drive's lag {1e3 * design.sampled.lag:.3g} ms, "
         f"{f'states by {design.chosen.name}' if plain_matrices else 'velocities made from rounded encoders'}."
-        f"{_effort(design)}"
+        f"{_effort(design)}{_dead_zone(design)}"
     )
     what = f"{design.rig.name}, {design.request.at}".removesuffix(", ")
     held = "the model" if plain_matrices else f"the rig at '{design.request.at}'"
@@ -257,6 +257,28 @@ def _effort(design: Designed) -> str:
     return rest + (
         f" The requested start takes {number(design.peak_sampled, 3)} {design.rig.unit} at most, "
         f"{number(design.peak, 3)} {design.rig.unit} by the continuous model."
+    )
+
+
+def _dead_zone(design: Designed) -> str:
+    """The cycle that the drive's dead zone keeps up: by its describing function, and simulated."""
+    lost = 0.0 if design.request.on is None else design.request.on.more.get("actuator.dead_zone", 0.0)
+    if not lost or design.chosen.margins is None:
+        return ""
+    unit, held = design.rig.unit, design.holding
+    size, frequency = design.chosen.margins.dead_zone_cycle(lost)
+    swallows = f" The drive swallows {number(lost, 3)} {unit} to either side"
+    expected = f": by its first harmonic the loop cycles by ±{number(size, 2)} {unit} at {number(frequency, 2)} rad/s"
+    if not size:
+        expected = ", which by its first harmonic keeps no cycle up"
+    if held is None or math.isfinite(held.lost):
+        return f"{swallows}{expected}."
+    cycle = held.effort.command
+    if cycle is None:
+        return f"{swallows}{expected}; simulated with counts and dry friction it keeps no regular one."
+    return (
+        f"{swallows}{expected}; simulated with counts and dry friction by ±{number(cycle.size, 2)} {unit} at "
+        f"{number(2 * math.pi / cycle.period, 2)} rad/s."
     )
 
 

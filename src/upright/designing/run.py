@@ -41,6 +41,8 @@ from upright.workers import one_thread
 
 SLOWEST, ROWS = 10.0, 60_000
 """Time constants of the slowest pole, and most samples, for which the motion to rest is simulated."""
+CYCLES = 18
+"""Of a dead zone, for which it is simulated: the last third has four of them where they are slower by a third."""
 MOST_STATES = 30
 """States from which 60 digits take longer than anyone waits."""
 
@@ -272,7 +274,7 @@ def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
         rig=rig, request=request, model=model, sampled=sampled, K=used, continuous=K, placement=placement,
         sampled_gains=gains, R=R, law=law, poles=to_s(poles_of(closed(sampled, law)), sampled.period),
         ways=tuple(loops.values()), chosen=loops[speed], k_pf=k_pf, peak=float(np.abs(u).max()),
-        peak_sampled=peak, holding=_holding(request, sampled, law, start, peak),
+        peak_sampled=peak, holding=_holding(request, sampled, law, start, peak, loops[speed].margins),
         swing=(t, x @ model.C.T + u @ model.D.T, u), chance=chance, cloud=cloud,
     )  # fmt: skip
 
@@ -382,12 +384,17 @@ def _peak(sampled: StateSpace, law: Law, start: Array, seconds: float) -> float:
     return float(np.abs(swing(sampled, law, start, samples)[1]).max())
 
 
-def _holding(request: DesignRequest, sampled: StateSpace, law: Law, start: Array, peak: float) -> Holding | None:
+def _holding(
+    request: DesignRequest, sampled: StateSpace, law: Law, start: Array, peak: float, standing: Margins | None
+) -> Holding | None:  # fmt: skip
     """What holding takes on the rig, let go near enough for half of the limit to bring it back."""
     if request.on is None or request.limit is None or not 0 < peak < math.inf:
         return None
     slowest = -float(to_s(poles_of(closed(sampled, law)), request.period).real.max())
-    seconds = min(max(SLOWEST / slowest, 6.0), ROWS * request.period)
+    lost = request.on.more.get("actuator.dead_zone", 0.0)
+    _, frequency = (0.0, 0.0) if standing is None else standing.dead_zone_cycle(lost)
+    cycles = CYCLES * math.tau / frequency if frequency else 0.0
+    seconds = min(max(SLOWEST / slowest, 6.0, cycles), ROWS * request.period)
     rig = request.on.replace(delay=sampled.delay * request.period, lag=sampled.lag)
     near = start * min(1.0, 0.5 * request.limit / peak)
     run = trial(rig, replace(law, target=0.0), at=request.at, start=near, seconds=seconds)

@@ -39,10 +39,6 @@ def examine(
         Which column is what, from `read_known`; recognised without.
     before : tuple of Finding
         What was found, and mended, while the log was read.
-
-    Returns
-    -------
-    Diagnosis
     """
     inspection = inspect_record(record)
     wiring = wiring or Wiring()

@@ -41,7 +41,6 @@ class Finding:
         One word of `KINDS`.
     columns : tuple of str
         Columns of the log that it is about.
-    severity : {"fault", "warning", "note"}
     sentence : str
         What looks wrong.
     evidence : mapping of str to float

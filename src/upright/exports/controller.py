@@ -22,8 +22,6 @@ class SampledController:
 
     Attributes
     ----------
-    readings, references, commands : tuple of str
-    reading_units : tuple of str
     signs : tuple of float
         Of the encoders, one for each reading.
     title : str

@@ -36,11 +36,11 @@ def feedback(estimator: Estimator, K: ArrayLike, k_pf: float = 0.0) -> Law:
     )  # fmt: skip
 
 
-def closed(model: StateSpace, law: Law, gain: float = 1.0) -> Array:
-    """Matrix of the loop, the model's states first; `gain` multiplies the command on its way to the plant."""
+def closed(model: StateSpace, law: Law) -> Array:
+    """Matrix of the loop, the model's states first."""
     without_feedthrough(model, "a loop")
     B, D = law.B[:, : law.readings], law.D[:, : law.readings]
-    top = np.hstack([model.A + gain * model.B @ D @ model.C, gain * model.B @ law.C])
+    top = np.hstack([model.A + model.B @ D @ model.C, model.B @ law.C])
     return np.vstack([top, np.hstack([B @ model.C, law.A])])
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput
 from upright.gains.requests import UNREACHED, Roots, checked, lost_modes, matched, poles_of, written
 from upright.laws.linear import Array
+from upright.systems.motion import march
 
 
 class LeastCost(NamedTuple):
@@ -159,10 +160,7 @@ def linear_motion(A: Array, B: Array, K: Array, start: ArrayLike, seconds: float
     seconds = seconds or 10 / slow
     samples = int(np.clip(40 * fast * seconds, 400, 20_000))
     step = np.asarray(expm((A - B @ K) * seconds / samples), dtype=np.float64)
-    x = np.empty((samples + 1, A.shape[0]))
-    x[0] = start
-    for k in range(samples):
-        x[k + 1] = step @ x[k]
+    x, _ = march(step, B[:, :0], np.zeros((samples + 1, 0)), np.asarray(start, dtype=np.float64))
     return np.linspace(0.0, seconds, samples + 1), x, -x @ K.T
 
 

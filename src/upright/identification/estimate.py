@@ -32,6 +32,7 @@ from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
 from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
+from upright.identification.problem.normal_equations import correlation
 from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import Moments, unasked_trips, with_trip_guesses
@@ -373,12 +374,7 @@ def _correlation(best: Optimum, identifiable: Identifiability) -> Array:
     places = [i for i in best.shared if best.problem.unknowns[i].name in identifiable.names]
     if best.lost:
         return np.eye(len(places))
-    C = best.covariance[np.ix_(places, places)]
-    d = np.sqrt(np.maximum(np.diag(C), 0.0))
-    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
-    R = C * s[:, None] * s
-    np.fill_diagonal(R, 1.0)
-    return R
+    return correlation(best.covariance[np.ix_(places, places)])
 
 
 def _poles(best: Optimum) -> dict[str, tuple[Pole, ...]]:

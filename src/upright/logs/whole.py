@@ -39,7 +39,6 @@ class RunLog:
     ----------
     columns : dict of str to array, shape (rows,)
         int64 where numbers are whole, float64 else; NaN where the loop's number was none, such as an infinite command.
-    events : tuple of RunEvent
     complaint : str
         Why this is not all that was handed over or written, as a sentence; empty for a file that its writer finished.
     size, readable : int

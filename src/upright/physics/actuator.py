@@ -80,7 +80,6 @@ def drive_force(plant: type[Plant], values: Mapping[str, float], u: Array, v: Ar
 
     Parameters
     ----------
-    plant : class of a plant
     values : mapping
         The actuator's numbers by name, such as ``"actuator.gain"``.
     u, v : array, shape (inputs, N) and (coordinates, N)

@@ -57,14 +57,12 @@ def chapter(
 
     Parameters
     ----------
-    sheet : Ratings, Means or Shares
     title, source : str
         Heading of the page, and name of the file.
     answers : int, optional
         On how many answers printed numbers rest.
     scale : (int, int)
         Ends of the scale of ratings.
-    steps : sequence of Step
     """
     n = answers or 0
     if isinstance(sheet, Ratings):

@@ -126,7 +126,6 @@ class RunEnd:
         Of the log.
     log_message : str
         What is wrong with the log, as a sentence.
-    events : tuple of (float, str, str)
     warning : str
         About the priority that the loop got.
     seconds : float

@@ -68,8 +68,6 @@ class Table:
 
     Attributes
     ----------
-    headings : tuple of str
-    rows : tuple of tuple of str
     numbers : tuple of int
         Columns set flush right.
     badge : int, optional
@@ -160,7 +158,6 @@ class Part:
 
     Attributes
     ----------
-    content : tuple of Block
     key : str
         Anchor on the page; its number when empty.
     aside : bool
@@ -229,8 +226,6 @@ class Chapter:
         What was learned, in a sentence; and how far it can be trusted.
     sound : bool
         Whether the verdict is one to build on.
-    parts : tuple of Part
-    warnings : tuple of str
     steps : tuple of Step
         What to do next.
     findings : tuple of KeyNumber
@@ -329,7 +324,6 @@ class Book:
     ----------
     facts : tuple of (str, str)
         For the cover: what was run, on which rig, when, by which program.
-    chapters : tuple of Chapter
     first_line : str
         What stands before everything else: that no rig was driven.
     notes : tuple of str

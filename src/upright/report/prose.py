@@ -118,13 +118,14 @@ def templates_of(package: str) -> Environment:
     """The templates beside the modules of a package, with the program's ways to write numbers as filters."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    templates = Environment(
+    templates: Any = Environment(  # its stubs know only its own filters and tests
         loader=PackageLoader(package, "."), undefined=StrictUndefined, finalize=_cell, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
     templates.filters.update({
         "number": number, "percent": percent, "symbol": plain, "typed": typed, "unit": unit, "fmt": format,
         "degrees": math.degrees, "in_percent": in_percent, "parameter": Symbol, "sentence": _sentence,
+        "capital": lambda text: f"{text[:1].upper()}{text[1:]}",
     })  # fmt: skip
     templates.tests.update({"finite": math.isfinite})
     return templates
@@ -179,6 +180,8 @@ def _part(heading: str, body: str, figures: Mapping[str, Callable[[], Any]], pla
 
 
 def _block(text: str, figures: Mapping[str, Callable[[], Any]]) -> Block:
+    if "![" in text[1:]:
+        raise ValueError(f"a picture needs a blank line before it: {text}")
     if text.startswith("|"):
         return _table(text)
     if text.startswith("- "):

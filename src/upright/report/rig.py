@@ -112,9 +112,8 @@ class _Drawing:
             f' style="max-height:380px">{"".join(self.out)}</svg>'
         )
 
-    def _line(self, points: Array, colour: str, width: float, more: str = "", *, sized: bool = True) -> None:
-        if sized:
-            self.boxes.append(points)
+    def _line(self, points: Array, colour: str, width: float, more: str = "") -> None:
+        self.boxes.append(points)
         places = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         self.out.append(
             f'<polyline points="{places}" fill="none" stroke="{colour}" stroke-width="{width:g}"'

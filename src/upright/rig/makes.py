@@ -49,7 +49,6 @@ class BodyOnSpring:
 
     Attributes
     ----------
-    kind : {"rectilinear", "torsional"}
     rig : Rig
         As designed, without added masses.
     step : float
@@ -233,16 +232,10 @@ NOMINAL = cast("Furuta", MAKES["furuta"].rig.plant).replace(b_1=6e-4, b_1c=1.5e-
 """The Furuta pendulum as designed, its drive belt off."""
 
 
-def make_named(key: str, among: tuple[str, ...] = tuple(MAKES), *, option: str = "--rig") -> Make:
-    """Make that an option of the command line names.
-
-    Raises
-    ------
-    BadInput
-        When it is none of those that are `among` the choices.
-    """
-    if key not in among:
-        raise BadInput(f"{option} is one of {', '.join(among)}, got '{key}'; {nearest(key, among)}")
+def make_named(key: str, *, option: str = "--rig") -> Make:
+    """Make that an option of the command line names; `BadInput` where there is none."""
+    if key not in MAKES:
+        raise BadInput(f"{option} is one of {', '.join(MAKES)}, got '{key}'; {nearest(key, MAKES)}")
     return MAKES[key]
 
 

@@ -25,6 +25,11 @@ Where its encoders count otherwise than it is described, per turn or metre, with
 
     [counts]
     psi = -2400
+
+And what its drive swallows of a command to either side (`upright rig doctor` writes both)::
+
+    [drive]
+    dead_zone = "0.4 V"
 """
 
 from __future__ import annotations
@@ -43,7 +48,7 @@ from upright.study.text import Section, StudyText, toml
 
 KEYS = (
     "kind", "name", "fit", "study", "make", "seed", "vendor", "port", "record", "at", "zero", "limits", "board",
-    "loadings", "counts",
+    "loadings", "counts", "drive",
 )  # fmt: skip
 _EACH = ("travel", "speed", "start")
 _ALL = ("command", "watchdog", "saturation", "frozen", "twist", "lean")
@@ -159,14 +164,29 @@ class RigFile:
         values["fit"] = Path(os.path.relpath(fit, path.parent)).as_posix()
         return replace_file(path, "".join(f"{k} = {toml(v, 17)}\n" for k, v in values.items()).encode())
 
+    def dead_zone(self, unit: str, default: float) -> float:
+        """Command that the drive swallows to either side [its unit]."""
+        drive = _root(self.path).section("drive")
+        drive.check(("dead_zone",), "number of the drive")
+        return drive.number("dead_zone", unit, default)
+
     def with_counts(self, counts: Mapping[str, float]) -> Path:
         """Write signed counts per turn or metre into the file; everything else stays as its owner wrote it."""
-        lines = [f"{name} = {toml(value, 9)}" for name, value in {**self.counts, **counts}.items()]
+        return self._with("counts", {**self.counts, **counts})
+
+    def with_dead_zone(self, dead_zone: str) -> Path:
+        """Write what the drive swallows, such as ``"0.4 V"``, into the file."""
+        return self._with("drive", {"dead_zone": dead_zone})
+
+    def _with(self, section: str, values: Mapping[str, Any]) -> Path:
+        lines = [f"{name} = {toml(value, 9)}" for name, value in values.items()]
         text = self.path.read_text(encoding="utf-8").rstrip("\n")
-        before, section, after = text.partition("\n[counts]")
+        before, there, after = text.partition(f"\n[{section}]")
         rest = "".join(f"\n[{part}" for part in after.split("\n[")[1:])
-        before = before if section else text + "\n"
-        return replace_file(self.path, ("\n".join([before, "[counts]", *lines]) + f"\n{rest}".rstrip() + "\n").encode())
+        before = before if there else text + "\n"
+        return replace_file(
+            self.path, ("\n".join([before, f"[{section}]", *lines]) + f"\n{rest}".rstrip() + "\n").encode()
+        )
 
     def lean(self, unit: str, default: float) -> float:
         """How far the last coordinate may be from what is held [rad or m]."""
@@ -217,6 +237,8 @@ def read_rig_file(path: Path) -> RigFile:
     board, loadings, counts = root.section("board").values, root.section("loadings"), root.section("counts")
     if driver.performed and counts.values:
         raise root.error("counts", f'kind = "{kind}" counts as it is described; leave [counts] out')
+    if driver.performed and root.section("drive").values:
+        raise root.error("drive", f'kind = "{kind}" has the drive that is described; leave [drive] out')
     for name in counts.values:
         if not counts.number(name, "1", 1.0):
             raise counts.error(name, "counts per turn or metre are not zero; a minus turns the encoder round")

@@ -25,8 +25,6 @@ class Checkup:
 
     Attributes
     ----------
-    name : str
-    findings : tuple of CheckupFinding
     counts : mapping of str to float
         Signed counts per turn or metre that its encoders have, where those are not the described ones.
     written : Path or None
@@ -123,6 +121,11 @@ def check_up(
         f"Shall {path} take the counts that were seen, {lines}? No, if you rather swap channels."
     ):  # fmt: skip
         written = file.with_counts(counts)
+    swallowed = steps.swallowed
+    if swallowed and hand is not None and file.hardware and hand(
+        f"Shall {path} take the drive's dead zone, {swallowed}? A law that knows it makes up for it."
+    ):  # fmt: skip
+        written = file.with_dead_zone(swallowed)
     return Checkup(
         name=model.name, findings=tuple(out), counts=counts, written=written, dead_zone=steps.dead_zone
     )  # fmt: skip

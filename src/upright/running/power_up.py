@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from upright.control.watch import sticking
 from upright.errors import RigStopped
 from upright.rig import Rig
 from upright.rigs import Board, Fault, LiveRig, Mode, TwinPort
@@ -59,8 +60,6 @@ class FirstPowerUp:
 
     Attributes
     ----------
-    beside : Supervisor
-    model : Rig
     hand : callable or None
         Called with a sentence that asks for something to be done, or a question; answers whether it was, or yes. A
         twin moves itself where there is none.
@@ -225,6 +224,19 @@ class FirstPowerUp:
         not_yet = f", and not at {below:.3g} {unit}" if below else ""
         yield CheckupFinding(what="the drive, backward", observed=f"moves from {first:.3g} {unit} on{not_yet}")
 
+    @property
+    def swallowed(self) -> str:
+        """The dead zone by the first motion, with its unit; empty where there is none beyond friction.
+
+        In the middle between the largest command that moved nothing and the smallest that did, less what the model's
+        dry friction takes of it.
+        """
+        below, first = self.dead_zone
+        friction = sticking(self.model)
+        if not below or below <= friction:
+            return ""
+        return f"{(below + first) / 2 - friction:.3g} {self.model.unit}"
+
     def _steadied(self, request: str = "Bring all to rest where it hangs, and take your hands away.") -> None:
         if self.hand is not None:
             self.hand(request)
@@ -289,7 +301,9 @@ class FirstPowerUp:
         return self._strength(shown, went / model[self.driven], went / least[self.driven])
 
     def _expected(self, pulse: float) -> list[float]:
-        return list(pulse_response(self.model, self.beside.duty.zero, pulse).moved.values())
+        """Of a drive without a dead zone, which the pulses show."""
+        more = {name: value for name, value in self.model.more.items() if name != "actuator.dead_zone"}
+        return list(pulse_response(self.model.replace(more=more), self.beside.duty.zero, pulse).moved.values())
 
     def _strength(self, shown: str, ratio: float, at_most: float) -> CheckupFinding:
         guessed = "actuator.gain" in self.model.guessed

@@ -38,7 +38,7 @@ def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
         model, truth = make_rig(make.key), make_rig(make.key, file.seed)
         return (replace(model, name=file.name), truth) if file.name else (model, truth)
     known = read_stored_rig(file.known, seed=file.seed)
-    model = _counted(completed(known, vendor=file.vendor, who="a run on a rig", form=""), file)
+    model = _corrected(completed(known, vendor=file.vendor, who="a run on a rig", form=""), file)
     truth = model
     if file.performed == SIMULATED and file.make:
         truth = make_rig(make_named(file.make, option="make").key, file.seed)
@@ -47,16 +47,18 @@ def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
     return (replace(model, name=file.name), truth) if file.name else (model, truth)
 
 
-def _counted(model: Rig, file: RigFile) -> Rig:
-    """The rig with the counts that its file corrects."""
-    if not file.counts:
-        return model
+def _corrected(model: Rig, file: RigFile) -> Rig:
+    """The rig with the counts and the dead zone that its file says."""
     names = [c.name for c in model.plant.coordinates]
     if unknown := sorted(file.counts.keys() - set(names)):
         raise BadInput(f"{file.path}: [counts] has no coordinate '{unknown[0]}'; {nearest(unknown[0], names)}")
-    return model.replace(
-        counts=[abs(file.counts.get(name, n)) for name, n in zip(names, model.counts, strict=True)]
-    )  # fmt: skip
+    if file.counts:
+        model = model.replace(
+            counts=[abs(file.counts.get(name, n)) for name, n in zip(names, model.counts, strict=True)]
+        )  # fmt: skip
+    known = model.more.get("actuator.dead_zone", 0.0)
+    dead_zone = file.dead_zone(model.unit, known)
+    return model if dead_zone == known else model.replace(more={**model.more, "actuator.dead_zone": dead_zone})
 
 
 def live_rig(file: RigFile, model: Rig, truth: Rig) -> LiveRig:

@@ -46,7 +46,6 @@ class Study:
         The study file.
     plant : str
         Plant as the study names it.
-    runs : tuple of Run
     title, source : str
         Heading and origin of the data, for the report; may be empty.
     sha256 : str

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from upright.errors import BadInput, nearest
 from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
-from upright.records import Provenance, Record
+from upright.records import Record
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
-from upright.verbs.linear.motion import motion_of_linear
+from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin
 
 if TYPE_CHECKING:
     from upright.rig import Rig
@@ -117,7 +117,7 @@ def simulate(
         _check_gains(rig, np.atleast_2d(np.asarray(law, dtype=np.float64)), point)
     command = _command(u, t, len(plant.inputs))
     x = motion(plant, drive, x0, command, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
-    _check_bounded(t, x[:, : len(names)], names)
+    check_bounded(t, x[:, : len(names)], names, ", so this loop does not stabilize the plant")
     signals = {name: x[:, i] for i, name in enumerate(names)}
     put_out = x[:, len(names) :] if loop is not None else command
     commands = {}
@@ -127,8 +127,7 @@ def simulate(
         t=t, signals=signals | commands,
         units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
         inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
-        provenance=Provenance(reader="simulation", rig=type(plant).__name__,
-                              notes=("This log was simulated; no rig was touched.",)),
+        provenance=simulated_origin(type(plant).__name__),
     )  # fmt: skip
 
 
@@ -170,17 +169,6 @@ def _check_gains(rig: Rig, K: Array, point: Mapping[str, float]) -> None:
             f"these gains stabilise the plant by a force [{force}], and not the rig by its command [{rig.unit}]: a "
             f'rig takes gains for its command, such as up.place(rig.linear("{at}"), ...); gains of a force belong to '
             "rig.plant, or divide them by rig.gain."
-        )
-
-
-def _check_bounded(t: Array, x: Array, names: Sequence[str]) -> None:
-    """Refuse a motion that left all bounds."""
-    wild = ~(np.abs(x) < 1e15)
-    if wild.any():
-        k = int(np.argmax(wild.any(axis=1)))
-        raise BadInput(
-            f"the motion grows without bound: {names[int(np.argmax(wild[k]))]} is beyond 1e15 at {t[k]:.4g} s, so this "
-            "loop does not stabilize the plant; change its gains or its start, or simulate fewer seconds."
         )
 
 
@@ -292,15 +280,10 @@ def _loop(
 ) -> Law | Rule | None:
     if law is None or isinstance(law, Law | Rule):
         return law
-    try:
-        K = np.atleast_2d(np.asarray(law, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise BadInput(
-            f"simulate closes the loop by gains, a Law or a Rule, got {type(law).__name__}; up.place makes gains."
-        ) from None
-    wanted = (len(plant.inputs), len(plant.state_names()))
-    if K.shape != wanted:
-        raise BadInput(f"gains for {type(plant).__name__} need shape {wanted}, got {K.shape}.")
+    K = read_gains(
+        law, (len(plant.inputs), len(plant.state_names())), type(plant).__name__,
+        f"simulate closes the loop by gains, a Law or a Rule, got {type(law).__name__}; up.place makes gains.",
+    )  # fmt: skip
     target = np.array([point[c.name] for c in plant.coordinates])
     return state_feedback(K, dt, memory=memory, target=target, limit=limit, resolution=steps)
 

@@ -15,6 +15,7 @@ from typing import Any
 from upright.errors import BadInput
 from upright.progress import silent
 from upright.workers.carriage import carried, unpacked
+from upright.workers.linear_algebra import limit_threads
 
 IDLE = 60
 """Seconds after which processes without work end."""
@@ -37,13 +38,7 @@ def _task(order: bytes) -> Any:
     return unpacked(order)
 
 
-@cache
-def _one_thread() -> None:
-    import scipy.linalg  # brings a linear algebra of its own, which has to be there to be limited
-    from threadpoolctl import threadpool_limits
-
-    assert scipy.linalg
-    threadpool_limits(1, user_api="blas")
+_one_thread = cache(limit_threads)
 
 
 def _leave_ctrl_c_to_the_parent() -> None:
@@ -67,9 +62,10 @@ class Pool(ABC):
     def executor(self) -> Executor:
         """Executor that takes work now; another one when the last broke."""
 
-    @abstractmethod
     def stop(self, running: Iterable[Future[Any]]) -> None:
-        """Leave off what is under way."""
+        """Take back what waits; what is under way ends by itself."""
+        for future in running:
+            future.cancel()
 
 
 class Processes(Pool):
@@ -86,8 +82,7 @@ class Processes(Pool):
 
     def stop(self, running: Iterable[Future[Any]]) -> None:
         """End the processes; what is under way would keep them."""
-        for future in running:
-            future.cancel()
+        super().stop(running)
         self.executor().shutdown(kill_workers=True)  # type: ignore[call-arg]
 
 
@@ -117,11 +112,6 @@ class Lent(Pool):
             raise BadInput(f"{self.name} was shut down; call within its with block.")
         return self._executor
 
-    def stop(self, running: Iterable[Future[Any]]) -> None:
-        """Take back what waits; what is under way ends by itself."""
-        for future in running:
-            future.cancel()
-
 
 class Cluster(Pool):
     """Workers of a Dask cluster, which have this program installed."""
@@ -143,11 +133,6 @@ class Cluster(Pool):
     def executor(self) -> Executor:
         """The scheduler, which hands work on and replaces workers that died by others."""
         return self._executor
-
-    def stop(self, running: Iterable[Future[Any]]) -> None:
-        """Take back what waits there."""
-        for future in running:
-            future.cancel()
 
 
 _clients: dict[str, Any] = {}

@@ -8,14 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from contextlib import contextmanager
+from typing import Any
+
+
+def limit_threads() -> Any:
+    """Leave linear algebra one thread of this process from here on, or as long as what is given back is open."""
+    import scipy.linalg  # brings a linear algebra of its own, which has to be there to be limited
+    from threadpoolctl import threadpool_limits
+
+    assert scipy.linalg
+    return threadpool_limits(1, user_api="blas")
 
 
 @contextmanager
 def one_thread() -> Generator[None]:
     """Within it, or within a function that it decorates, linear algebra takes one thread of the whole process."""
-    import scipy.linalg  # brings a linear algebra of its own, which has to be there to be limited
-    from threadpoolctl import threadpool_limits
-
-    assert scipy.linalg
-    with threadpool_limits(1, user_api="blas"):
+    with limit_threads():
         yield

@@ -22,10 +22,13 @@ from tests.experiments.tracking_3.closed_form import (
     ran,
     tracking,
 )
+from tests.report.rendering import Rendered
 from upright.basis import MEASURED
-from upright.experiments.tracking_3 import tables
-from upright.experiments.tracking_3.chapter import chapter
+from upright.experiments.tracking_3.chapter import chapter, length, milli, percentage
 from upright.experiments.tracking_3.laws import AT
+from upright.experiments.tracking_3.run import run_tracking
+from upright.report.html import WORDS_OF_A_VERDICT
+from upright.report.page import Table
 from upright.rig.makes import make_rig
 
 LAWS = (SET_1, SET_4, SUM, PD, STIFF, FAR)
@@ -45,43 +48,49 @@ def whole(**measured):
     )  # fmt: skip
 
 
+def table(result, caption):
+    """The table of the chapter whose caption begins so."""
+    blocks = [b for part in chapter(result).parts for b in part.content]
+    (found,) = [b for b in blocks if isinstance(b, Table) and b.caption.startswith(caption)]
+    return found
+
+
 @pytest.mark.parametrize(
     ("value", "digits", "text"),
     [(0.1234, 1, "12.3 %"), (-0.002, 1, "−0.2 %"), (-1e-9, 1, "0.0 %"), (1.0, 0, "100 %"), (math.inf, 1, "–"),
      (0.12345, 2, "12.35 %")],
 )  # fmt: skip
 def test_a_share_is_a_percentage_and_what_never_was_is_a_dash(value, digits, text):
-    assert tables.percentage(value, digits) == text
+    assert percentage(value, digits) == text
 
 
 def test_lengths_are_in_the_unit_in_which_they_are_read():
-    assert tables.length(tracking(), math.radians(12.34)) == "12.3 deg"
+    assert length(tracking(), math.radians(12.34)) == "12.3 deg"
     carts = tracking(rig=make_rig("rectilinear"))
-    assert tables.length(carts, 0.01234, 2) == "12 mm"
-    assert (tables.milli(0.12345), tables.milli(math.inf)) == ("0.123", "never")
+    assert length(carts, 0.01234, 2) == "12 mm"
+    assert (milli(0.12345), milli(math.inf)) == ("0.123", "never")
 
 
 def test_gains_stand_with_what_they_make_of_the_loop():
-    table = tables.gain_table(whole())
-    assert [row[0] for row in table.rows] == [law.name for law in LAWS]
-    for row, law in zip(table.rows, LAWS, strict=True):
+    gains = table(whole(), "Gains of")
+    assert [row[0] for row in gains.rows] == [law.name for law in LAWS]
+    for row, law in zip(gains.rows, LAWS, strict=True):
         cells = [float(cell.replace("−", "-")) for cell in row[1:]]
         assert cells[:4] == pytest.approx(law.K[:4], rel=1e-3)
         assert cells[4] == pytest.approx(law.k_pf, rel=1e-3)
         assert cells[5] == pytest.approx(0.65 * law.k_pf, rel=1e-3)  # newton metres per radian: 0.65 N m/V
         assert cells[6] == pytest.approx(-law.poles.real.max(), rel=1e-2)
         assert cells[7] == pytest.approx(min(-law.poles.real / abs(law.poles)), rel=1e-1)
-    assert table.headings == ("law", "K θ₁", "K θ̇₁", "K θ₂", "K θ̇₂", "k_pf", "static force", "decay", "damping") or all(
-        heading.startswith("K ") for heading in table.headings[1:5]
-    )
-    assert table.numbers == tuple(range(1, 9))
-    assert "[V/rad]" in table.caption
-    assert "[N m/rad]" in table.caption
-    assert "[N/m]" in tables.gain_table(tracking(rig=make_rig("rectilinear"))).caption
+    assert gains.headings[5:] == ("k_pf", "static force", "decay", "damping")
+    assert all(heading.startswith("K θ") for heading in gains.headings[1:5])
+    assert gains.numbers == tuple(range(1, 9))
+    assert "[V/rad]" in gains.caption
+    assert "[N m/rad]" in gains.caption
+    assert "[N/m]" in table(tracking(outcome(SET_4), rig=make_rig("rectilinear")), "Gains of").caption
 
 
 def test_poles_asked_stand_beside_those_of_the_loop_as_it_runs():
-    rows = tables.shaft_pole_table(whole()).rows
+    rows = table(whole(), "Poles [1/s]").rows
     assert [row[0] for row in rows] == ["open loop", *(law.name for law in LAWS)]
     for row, law in zip(rows[1:], LAWS, strict=True):
         assert (row[1] == "–") == (law.requested.size == 0)
@@ -90,10 +99,10 @@ def test_poles_asked_stand_beside_those_of_the_loop_as_it_runs():
 
 
 def test_a_step_is_told_twice_as_predicted_and_as_measured():
-    table = tables.step_table(whole(last={"rise": 0.1999, "saturated": 0.0456}, first={"moved": False}))
-    assert len(table.rows) == 12
+    steps = table(whole(last={"rise": 0.1999, "saturated": 0.0456}, first={"moved": False}), "A step of")
+    assert len(steps.rows) == 12
     cells = ("0.101", "3.0 %", "0.202", "0.350", "0.404", "0.607", "7.89", "78.9 %", "0.00 %")
-    by_law = {law.name: table.rows[2 * i : 2 * i + 2] for i, law in enumerate(LAWS)}
+    by_law = {law.name: steps.rows[2 * i : 2 * i + 2] for i, law in enumerate(LAWS)}
     for name, (predicted, measured) in by_law.items():
         assert (predicted[0], measured[0]) == (name, "")
         assert predicted[1] == "predicted"
@@ -102,23 +111,23 @@ def test_a_step_is_told_twice_as_predicted_and_as_measured():
     assert by_law["set 4"][1][2:] == ("0.200", *cells[1:8], "4.56 %")
     assert by_law["set 1"][1][2:8] == ("does not move", *("–",) * 5)
     assert by_law["far"][1][2:8] == ("trips at 0.40 s", *("–",) * 5)
-    assert len(table.headings) == len(table.rows[0])
-    assert table.numbers == tuple(range(2, 11))
-    assert "14.3 deg" in table.caption  # 0.25 rad
+    assert len(steps.headings) == len(steps.rows[0])
+    assert steps.numbers == tuple(range(2, 11))
+    assert "14.3 deg" in steps.caption  # 0.25 rad
 
 
 def test_without_a_rig_only_what_is_predicted_stands_in_the_tables():
     alone = tracking(outcome(SET_1), outcome(SET_4))
-    assert [row[:2] for row in tables.step_table(alone).rows] == [("set 1", "predicted"), ("set 4", "predicted")]
-    table = tables.friction_table(alone)
-    assert table.headings == ("law", "error, at most", "predicted", "push, no friction", "predicted")
-    assert [len(row) for row in table.rows] == [5, 5]
+    assert [row[:2] for row in table(alone, "A step of").rows] == [("set 1", "predicted"), ("set 4", "predicted")]
+    friction = table(replace(alone, pd=outcome(PD)), "Error at rest")
+    assert friction.headings == ("law", "error, at most", "predicted", "push, no friction", "predicted")
+    assert [len(row) for row in friction.rows] == [5, 5, 5]
 
 
 def test_what_friction_leaves_stands_beside_its_bound_and_the_push_beside_its_value_without_friction():
     """Play over step; a tenth of 10 V over k_pf over step; error and give of the runs over step."""
-    table = tables.friction_table(whole(first={"settling_2": math.inf}))
-    rows = {row[0]: row[1:] for row in table.rows}
+    friction = table(whole(first={"settling_2": math.inf}), "Error at rest")
+    rows = {row[0]: row[1:] for row in friction.rows}
     assert set(rows) == {law.name for law in LAWS} - {"far"}  # which trips and has no rest
     share = SET_4.play / SIZE
     assert rows["set 4"][0] == f"{100 * share:.1f} %"
@@ -126,33 +135,32 @@ def test_what_friction_leaves_stands_beside_its_bound_and_the_push_beside_its_va
     assert rows["set 4"][3] == f"{100 * 0.1 * 10 / SET_4.k_pf / SIZE:.1f} %"
     assert rows["set 4"][4:] == ("20.0 %", "20.0 %")
     assert rows["set 1"][1:3] == ("2.0 %", "still swings")
-    assert rows["with a sum"] == ("0 (sum)", "2.0 %", "0.1 %", "0 (sum)", "20.0 %", "0.8 %")
-    assert table.numbers == tuple(range(1, 7))
-    assert "(1.0 V)" in table.caption
+    assert rows["with a sum"] == ("0 (integral)", "2.0 %", "0.1 %", "0 (integral)", "20.0 %", "0.8 %")
+    assert friction.numbers == tuple(range(1, 7))
+    assert "(1.0 V)" in friction.caption
 
 
 def test_the_verdict_says_effort_arrival_push_and_what_pd_does():
     told = chapter(whole())
     assert told.verdict == (
-        "A step of 14.3 deg is followed by all 2 sets of poles within effort, travel and twist; set 4 takes 79 % of "
-        "the drive's limit and arrives in 0.607 s. A tuned PD of the near encoder arrives in 0.988 s, with 31 % of the "
-        "limit, but a push of the drive moves it by 40 % of the step, set 4 by 20 %; made as stiff, the PD swings for "
-        "1.9 s."
+        "All 2 pole sets follow a step of 14.3 deg within effort, travel and twist. Set 4 takes 79 % of the drive's "
+        "limit and arrives in 0.607 s. A tuned PD of the near encoder arrives in 0.988 s at 31 % of the limit, but a "
+        "push moves it by 40 % of the step, set 4 by 20 %. As stiff, it swings for 1.9 s."
     )
     assert told.sound
-    assert told.detail.startswith("Tried on the rig.")
+    assert told.detail == "Run on a simulated rig."
 
 
 @pytest.mark.parametrize(
     ("measured", "said"),
     [
-        ({"first": {"tripped": 0.456}}, "is too much for set 1 (leaves travel or twist after 0.46 s); set 4"),
+        ({"first": {"tripped": 0.456}}, "is too much for set 1 (leaves travel or twist after 0.46 s). Set 4"),
         (
             {"last": {"saturated": 0.0123}},
-            "is too much for set 4 (at the drive's limit in 1.2 % of the samples); set 4",
+            "is too much for set 4 (at the drive's limit in 1.2 % of the samples). Set 4",
         ),
-        ({"last": {"arrival": math.inf}}, "and never comes to stay within 5 %."),
-        ({"stiff": {"moved": False}}, "made as stiff, the PD does not settle."),
+        ({"last": {"arrival": math.inf}}, "and never stays within 5 %."),
+        ({"stiff": {"moved": False}}, "As stiff, it does not settle."),
         ({"pd": {"moved": False}}, "arrives in 0.607 s."),
         ({"last": {"moved": False}}, "within effort, travel and twist."),
     ],
@@ -173,50 +181,50 @@ def test_the_verdict_can_be_built_on_where_every_set_settles_within_the_limits(m
 
 def test_a_single_set_is_called_by_its_name_and_what_was_not_tried_is_said():
     one = chapter(tracking(outcome(SET_4)))
-    assert "is followed by set 4 within" in one.verdict
-    assert one.detail == "Predicted with the fitted numbers; no rig was touched."
-    assert [part.title for part in one.parts] == ["Gains", "Closed loop"]
+    assert "Set 4 follows a step of 14.3 deg within" in one.verdict
+    assert one.detail == "Predicted with the fitted model; no rig was touched."
+    assert [part.title for part in one.parts] == ["Closed loop", "Gains"]
     some = chapter(tracking(outcome(SET_1), outcome(SET_4, ran(), ran()), interrupted=True))
     assert some.detail == (
-        "Tried on the rig, but for what is predicted to leave the bounds: set 1. It was interrupted; what was finished "
-        "is reported."
+        "Run on a simulated rig, except for what is predicted to leave the bounds: set 1. Interrupted: this is what "
+        "was finished by then."
     )
 
 
 def test_every_part_has_its_turn_and_says_its_numbers():
     told = chapter(whole())
-    assert [part.title for part in told.parts] == ["Gains", "Closed loop", "What friction leaves", "Why state feedback"]
+    assert [part.title for part in told.parts] == ["Closed loop", "Why state feedback", "What friction leaves", "Gains"]
     text = {part.title: " ".join(b for b in part.content if isinstance(b, str)) for part in told.parts}
     assert (
-        "The step is 14.3 deg, bounded by effort; what each bound allows: 95 % of the drive's limit 14.4 deg, "
+        "The step is 14.3 deg, bounded by effort. Each bound allows: 95 % of the drive's limit 14.4 deg, "
         "60 % of the twist that trips the shaft 17.2 deg."
     ) in text["Gains"]
     assert "set 1 79 %, set 4 79 %" in text["Closed loop"]
-    assert "Predicted for set 4: 7.89 V (78.9 %); found the same." in text["Closed loop"]
+    assert "Predicted for set 4: 7.89 V (78.9 %); measured the same." in text["Closed loop"]
     assert "it leaves 0.1 % of the step" in text["What friction leaves"]
     why = text["Why state feedback"]
     p = RIG.plant.parameters()
     bound, least = 0.5 * math.sqrt(p["k_12"] / p["J_1"]), p["k_12"] * p["J_1"] / p["J_2"]
     for words in (
-        f"half the root of k/inertia 1, {bound:.2f} 1/s here", f"(inertia 1)/(inertia 2), {least:.2f} N m/rad",
-        f"where set 4 has {SET_4.stiffness:.1f}", "at 31 % of the limit", "the best of 0 pairs",
+        f"half the root of k/inertia 1, here {bound:.2f} 1/s", f"(inertia 1)/(inertia 2), {least:.2f} N m/rad",
+        f"set 4 has {SET_4.stiffness:.1f}", "at 31 % of the limit", "the best of 0 pairs",
         f"decays with {STIFF.decay:.1f} 1/s at a damping ratio of {STIFF.damping:.2g}",
         f"against {SET_4.decay:.2f} 1/s and {SET_4.damping:.2f}.",
         "trips the rig 0.3 s after the step",
     ):  # fmt: skip
         assert words in why
-    assert "does not trip the rig" in str(chapter(whole(far={"tripped": math.inf})).parts[-1].content)
+    assert "does not trip the rig" in str(chapter(whole(far={"tripped": math.inf})).parts[1].content)
     other = chapter(whole(last={"peak": 7.9}))
-    assert "found 7.9 V." in " ".join(b for b in other.parts[1].content if isinstance(b, str))
+    assert "measured 7.9 V." in " ".join(b for b in other.parts[0].content if isinstance(b, str))
 
 
 def test_what_was_predicted_to_trip_is_not_said_to_have_been_tried():
     done = whole()
     done = replace(done, far=outcome(FAR, ran(tripped=0.35)))
-    why = " ".join(b for b in chapter(done).parts[-1].content if isinstance(b, str))
-    assert "was not tried; it is predicted that it trips the rig 0.25 s after the step" in why
-    compared = next(b for b in chapter(done).parts[-1].content if getattr(b, "name", "") == "track-compared")
-    assert compared.caption.endswith("Predicted, not tried: far.")
+    why = " ".join(b for b in chapter(done).parts[1].content if isinstance(b, str))
+    assert "was not run; it is predicted that it trips the rig 0.25 s after the step" in why
+    compared = next(b for b in chapter(done).parts[1].content if getattr(b, "name", "") == "track-compared")
+    assert compared.caption.endswith("Predicted, not run: far.")
 
 
 def test_numbers_are_those_of_the_runs_in_si_units():
@@ -280,9 +288,49 @@ def test_a_set_that_bangs_at_rest_is_named_and_not_sound():
     """A tenth of the limit is quiet; three tenths are the largest disturbance of their own rig."""
     busy = whole(last={"rms": 0.3})
     told = chapter(busy)
-    assert "At rest the effort is excessive: the command's rms is 30 % of the limit with set 4 (10 % is quiet)." in (
+    assert "At rest the effort of set 4 is excessive: the command's rms is 30 % of the limit (10 % is quiet)." in (
         told.verdict
     )
     assert not told.sound
     assert chapter(whole(last={"rms": 0.1})).sound
     assert "excessive" not in chapter(whole(last={"rms": 0.1})).verdict
+
+
+def variants():
+    """A result for each verdict that the chapter can come to."""
+    return {
+        "as predicted": whole(),
+        "trips": whole(first={"tripped": 0.456}),
+        "saturates": whole(last={"saturated": 0.0123}),
+        "never arrives": whole(last={"arrival": math.inf, "peak": 7.9}),
+        "PD swings": whole(stiff={"moved": False}),
+        "still": whole(last={"moved": False}, first={"settling_2": math.inf}),
+        "busy": whole(last={"rms": 0.3}),
+        "far PD stays": whole(far={"tripped": math.inf}),
+        "far PD not run": replace(whole(), far=outcome(FAR, ran(tripped=0.35))),
+        "on the rig": replace(whole(), performed=""),
+        "predicted": tracking(outcome(SET_4)),
+        "interrupted": tracking(outcome(SET_1), outcome(SET_4, ran(), ran()), interrupted=True),
+    }
+
+
+def test_a_verdict_takes_at_most_120_words():
+    for name, result in variants().items():
+        page = chapter(result)
+        assert len(f"{page.title} {page.question} {page.verdict} {page.first_line}".split()) <= WORDS_OF_A_VERDICT, name
+
+
+@pytest.mark.slow
+def test_every_sentence_is_printed_for_some_result(tmp_path):
+    shaft = run_tracking("rectilinear", 1, tmp_path)
+    gain = shaft.fit.model.parameters["actuator.gain"]
+    known = {**shaft.fit.model.parameters, "actuator.gain": replace(gain, estimate=not gain.estimate)}
+    other = replace(shaft, fit=replace(shaft.fit, model=replace(shaft.fit.model, parameters=known)))
+    template = Rendered(chapter.__module__)
+    with template.watched():
+        for result in (*variants().values(), shaft, other):
+            chapter(result)
+    assert template.missed == {}
+    score = next(s for s in shaft.fit.runs.values() if s.role != "fit")
+    fit = next(part for part in chapter(shaft).parts if part.title == "Fit")
+    assert all(f"{v:.2f} % of" in str(fit.content) for v in score.fit_percent.values())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.report.rendering import Rendered
+from upright.experiments.stand.known import Known
 from upright.experiments.weighing_1a.chapter import added_options, chapter, loading_chapter
 from upright.experiments.weighing_1a.figures import (
     decrement_figure,
@@ -21,7 +24,8 @@ from upright.experiments.weighing_1a.run import Campaign, Weighing
 from upright.identification.loadings import Loaded, Loadings
 from upright.identification.model.fit import Estimate
 from upright.records import Record
-from upright.rig.makes import BODIES
+from upright.report.html import WORDS_OF_A_VERDICT
+from upright.rig.makes import BODIES, MAKES
 from upright.signals.free_swing import Decay
 
 K, BARE, RHO, DELTA = 400.0, 0.6, 0.8, 0.001
@@ -225,3 +229,35 @@ def test_logs_are_written_under_names_of_masses_and_runs(tmp_path):
     logs = {"2 masses, run 1": LOGS["0 g"]}
     assert campaign(logs=logs).written(tmp_path / "new").files == {"2 masses, run 1": "2x500g_run1.csv"}
     assert (tmp_path / "new" / "2x500g_run1.csv").exists()
+
+
+def test_every_sentence_is_printed_for_some_result():
+    template = Rendered(chapter.__module__)
+    make = MAKES["furuta"]
+    known = (Known(name="J_d", value=1.01 * make.rig.plant.J_d, stderr=1e-3 * make.rig.plant.J_d),)
+    later = Weighing(
+        rig=make.rig, make=make, folder=Path("w"), known=known, tolerance=0.0,
+        campaign=campaign(kind="torsional", truth=dict.fromkeys(("k", "J_0", "c"), 1.0)),
+    )  # fmt: skip
+    with template.watched():
+        page = chapter(later)
+        told(left_out=("too few swings",))
+        told(replace(FOUND, repeat=math.nan, swings=SWINGS[:1]), truth={"k": 401.23, "m_0": 0.61, "c": 1.2})
+    assert template.missed == {}
+    # ten standard errors, five times half an interval of 95 %, off by a hundredth
+    assert page.detail == "J_d is 1 % from the twin's true value, outside its 95 % interval."
+    assert len(f"{page.title} {page.question} {page.verdict}".split()) <= WORDS_OF_A_VERDICT
+
+
+def test_what_is_handed_on_stands_beside_the_true_value_with_its_standard_error():
+    make, true = MAKES["furuta"], MAKES["furuta"].rig.plant.J_d
+    done = Weighing(
+        rig=make.rig, make=make, folder=Path("w"), campaign=campaign(kind="torsional"), tolerance=0.0,
+        known=(Known(name="J_d", value=true, stderr=2e-3 * true),),
+    )  # fmt: skip
+    (row,) = tables(chapter(done))[-1].rows
+    value = [float(re.sub("·10⁻(.)", lambda m: f"e-{'⁰¹²³⁴⁵'.index(m[1])}", cell)) for cell in row[1:4]]
+    assert value == [pytest.approx(true, rel=1e-3), pytest.approx(true, rel=1e-3), pytest.approx(2e-3 * true, rel=0.05)]
+    (cover,) = chapter(done).findings
+    low, high = (float(n) for n in cover.interval.replace("·10⁻³", "e-3").split(" to "))
+    assert (high - low) / 2 == pytest.approx(1.96 * 2e-3 * true, rel=0.05)

@@ -50,8 +50,8 @@ def test_the_chapter_says_how_far_a_number_is_off_and_whether_its_interval_cover
     )
     told = chapter(Weighing(rig=rig, make=MAKES["rectilinear"], folder=tmp_path, campaign=body, known=known))
     assert told.detail == (
-        "m_1 lies 2 % from the twin's, inside its 95 % interval. k_12 lies 3 % from the twin's, outside its 95 % "
-        "interval."
+        "m_1 is 2 % from the twin's true value, inside its 95 % interval. k_12 is 3 % from the twin's true value, "
+        "outside its 95 % interval."
     )
     for finding, k in zip(told.findings, known, strict=True):
         low, high = map(float, finding.interval.split(" to "))

@@ -1,11 +1,10 @@
-"""Experiment 1a as a chapter: swings, the line through their frequencies, stiffness and bare inertia."""
+"""Experiment 1a as a chapter: the numbers that its words in `chapter.md` print, and what other programs read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-
-import numpy as np
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.stand import APPLIED
@@ -15,32 +14,70 @@ from upright.identification.loadings import Loaded, Loadings
 from upright.quantities import figures
 from upright.records import Record
 from upright.report.fit.tables import finding, interval, plain_estimate
-from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
+from upright.report.page import Chapter, KeyNumber, Step, Symbol
+from upright.report.prose import chapter_of
 from upright.report.symbols import number, typed, unit, with_error
-from upright.rig.makes import BODIES, Make
+from upright.rig.makes import BODIES, Mounted
 
-QUESTION = (
-    "How stiff is the spring, and how heavy is the bare body? A step makes the body swing; known inertias are added "
-    "and each time the frequency falls. 1/ω² is a line over the added inertia: its slope is 1/k, and it starts at the "
-    "bare inertia over k."
-)
 MOST_PANELS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandedOn:
+    """What a later experiment takes from here, beside the true value of the twin."""
+
+    name: str
+    value: float
+    stderr: float
+    truth: float
+    unit: str
+
+    @property
+    def digits(self) -> int:
+        """How many of its figures mean something."""
+        return figures(self.value, self.stderr)
+
+    @property
+    def off(self) -> float:
+        """Error relative to the true value [%]."""
+        return 100 * abs(self.value / self.truth - 1)
+
+    @property
+    def inside(self) -> bool:
+        """Whether the 95 % interval holds the true value."""
+        return abs(self.value - self.truth) <= 1.96 * self.stderr
+
+    @property
+    def finding(self) -> KeyNumber:
+        """As the cover shows it."""
+        low, high = (number(self.value + s * 1.96 * self.stderr, self.digits) for s in (-1, 1))
+        return KeyNumber(
+            what=Symbol(f"{self.name} [{self.unit}]"), value=number(self.value, self.digits),
+            interval=f"{low} to {high}", truth=number(self.truth, self.digits),
+        )  # fmt: skip
 
 
 def chapter(result: Weighing) -> Chapter:
     """Experiment 1a on a rig, beside the truth of a twin."""
-    campaign = result.campaign
+    campaign, true = result.campaign, result.campaign.truth
     loadings, body = campaign.loadings, BODIES[campaign.kind]
+    later = () if result.make is None else tuple(_handed_on(result, k) for k in result.known)
     page = loading_chapter(
         loadings, kind=campaign.kind, title="Stiffness and inertia from added loads", logs=campaign.logs,
         signals={label: record.outputs[0] for label, record in campaign.logs.items()}, left_out=campaign.left_out,
-        truth=campaign.truth or None, steps=_steps(result),
+        truth=true or None, steps=_steps(result), later=later,
+        mounted=None if result.make is None else result.make.mounted,
     )  # fmt: skip
-    if result.make is not None:
-        return _later_chapter(result, result.make, page)
     named = (("k", loadings.k, "stiffness"), (body.bare, loadings.bare, "inertia"), ("c", loadings.damping, "damping"))
+    if result.make is not None:
+        numbers = {
+            **{name: plain_estimate(w, true.get(name)) for name, w, _ in named},
+            "handed_on": {k.name: {"value": k.value, "stderr": k.stderr, "truth": k.truth} for k in later},
+            "swings": len(loadings.swings),
+        }
+        return replace(page, key="1a", findings=tuple(k.finding for k in later), numbers=numbers)
     findings = tuple(
-        finding(Symbol(f"{n} [{unit(_unit(campaign.kind, what))}]"), e, campaign.truth.get(n)) for n, e, what in named
+        finding(Symbol(f"{n} [{unit(_unit(campaign.kind, what))}]"), e, true.get(n)) for n, e, what in named
     )
     weighed = {body.inertia: {**plain_estimate(loadings.bare), "unit": body.unit}}
     handed_on = {k.name: {"value": k.value, "stderr": k.stderr} for k in result.known}
@@ -48,62 +85,12 @@ def chapter(result: Weighing) -> Chapter:
     return replace(page, key="1a", best="line", findings=findings, numbers=numbers)
 
 
-def _later_chapter(result: Weighing, make: Make, weighed: Chapter) -> Chapter:
-    """The chapter of a twin's body, with the rig that is built on it for the later experiments."""
-    campaign = result.campaign
-    loadings, true = campaign.loadings, campaign.truth
-    digits = {k.name: figures(k.value, k.stderr) for k in result.known}
-    units = {k.name: unit(type(result.rig.plant).quantity(k.name).unit) for k in result.known}
-    handed = Table(
-        caption="What the later experiments take from here",
-        headings=("symbol", "truth of the twin", "value", "std. error", "unit"),
-        rows=tuple(
-            (Symbol(k.name), number(_truth(result, k), digits[k.name]), *with_error(k.value, k.stderr), units[k.name])
-            for k in result.known
-        ),
-        numbers=(1, 2, 3),
+def _handed_on(result: Weighing, known: Known) -> HandedOn:
+    plant = result.rig.plant
+    return HandedOn(
+        name=known.name, value=known.value, stderr=known.stderr, truth=plant.parameters()[known.name],
+        unit=unit(type(plant).quantity(known.name).unit),
     )  # fmt: skip
-    steps = (
-        f"{len(campaign.logs)} steps of the command, masses of 500 g added one by one, each loading twice; dry "
-        "friction, encoder counts and converter steps are as on the rig."
-    )
-    named = (("k", loadings.k), (BODIES[campaign.kind].bare, loadings.bare), ("c", loadings.damping))
-    handed_on = {k.name: {"value": k.value, "stderr": k.stderr, "truth": _truth(result, k)} for k in result.known}
-    return replace(
-        weighed,
-        key="1a",
-        detail=" ".join(_sentence(result, k) for k in result.known),
-        parts=(
-            Part("The body", (make.mounted.bare, steps)),
-            *weighed.parts,
-            Part("What is handed on", (make.mounted.later, handed)),
-        ),
-        findings=tuple(
-            KeyNumber(
-                what=Symbol(f"{k.name} [{units[k.name]}]"),
-                value=number(k.value, digits[k.name]),
-                interval=f"{number(k.value - 1.96 * k.stderr, digits[k.name])} to "
-                f"{number(k.value + 1.96 * k.stderr, digits[k.name])}",
-                truth=number(_truth(result, k), digits[k.name]),
-            )
-            for k in result.known
-        ),
-        numbers={
-            **{name: plain_estimate(w, true.get(name)) for name, w in named},
-            "handed_on": handed_on,
-            "swings": len(loadings.swings),
-        },
-    )
-
-
-def _truth(result: Weighing, k: Known) -> float:
-    return result.rig.plant.parameters()[k.name]
-
-
-def _sentence(result: Weighing, k: Known) -> str:
-    off = abs(k.value / _truth(result, k) - 1)
-    inside = abs(k.value - _truth(result, k)) <= 1.96 * k.stderr
-    return f"{k.name} lies {100 * off:.2g} % from the twin's, {'inside' if inside else 'outside'} its 95 % interval."
 
 
 def _steps(result: Weighing) -> tuple[Step, ...]:
@@ -138,118 +125,52 @@ def added_options(campaign: Campaign, labels: Iterable[str]) -> str:
 def loading_chapter(
     loadings: Loadings, *, kind: str, title: str, logs: Mapping[str, Record], signals: Mapping[str, str],
     left_out: Sequence[str] = (), truth: Mapping[str, float] | None = None, steps: Sequence[Step] = (),
+    later: Sequence[HandedOn] = (), mounted: Mounted | None = None,
 ) -> Chapter:  # fmt: skip
-    """What the loadings say; `truth` is what a twin knows, `logs` and `signals` go by the label of the log."""
-    recursion = (
-        "Dry friction takes the same length δ = f/k off the centre in every half swing and leaves the period alone; "
-        "viscous friction takes the same share. Both follow from the heights of successive extremes."
-    )
-    lost = (Part("Left out", (Points(tuple(left_out)),)),) if left_out else ()
-    line = Picture(
-        name="line", draw=lambda: line_figure(loadings, _unit(kind, "inertia")),
-        caption="1/ω² over the added inertia. The slope is 1/k, the line meets zero at minus the bare inertia. "
-        "Bars: 95 % intervals of single swings.",
-        description=f"{len(loadings.swings)} points about a line; {loadings.verdict}",
-    )  # fmt: skip
-    named = (("k", loadings.k), ("bare", loadings.bare), ("damping", loadings.damping))
-    return Chapter(
-        title=title,
-        verdict=loadings.verdict,
-        sound=loadings.verdict.startswith("A line"),
-        question=QUESTION,
-        parts=(
-            Part(
-                "Data: the swings",
-                (recursion, _swing_table(loadings, kind), *_swing_pictures(loadings, logs, signals)),
-                aside=True,
-            ),
-            *lost,
-            Part("Fit: the line", (_estimate_table(loadings, kind, truth or {}), line)),
+    """What the loadings say; `truth` is what a twin knows, `logs` and `signals` go by the label of the log.
+
+    `later` and `mounted` are for the body of a rig that later experiments are made on.
+    """
+    shown = _one_of_each(loadings)
+    labels = [s.label.rsplit(", step ", 1)[0] for s in shown]
+    logged = [(s, logs[n], signals[n]) for s, n in zip(shown, labels, strict=True) if n in logs]
+    units = {what: unit(_unit(kind, what)) for what in ("stiffness", "inertia", "damping")}
+    draw: dict[str, Callable[[], Any]] = {
+        "swings": lambda: extremes_figure(logged),
+        "decrements": lambda: decrement_figure(shown),
+        "line": lambda: line_figure(loadings, _unit(kind, "inertia")),
+    }
+    page = chapter_of(
+        __name__, title=title, loadings=loadings, truth=truth, left_out=left_out, later=later, mounted=mounted,
+        logs=len(logs), logged=len(logged), units=units, repeat=loadings.repeat, interval=interval, digits=figures,
+        with_error=with_error, figures=draw,
+        named=(
+            ("k", "stiffness", loadings.k, units["stiffness"]),
+            (BODIES[kind].bare, "inertia of the bare body", loadings.bare, units["inertia"]),
+            ("c", "viscous friction", loadings.damping, units["damping"]),
         ),
-        steps=tuple(steps),
-        numbers={
-            **{name: plain_estimate(w) for name, w in named},
-            "kind": kind,
-            "verdict": loadings.verdict,
-            "truth": truth,
-            "left_out": left_out,
-            "swings": [
-                {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
-                 "sigma": s.decay.sigma, "delta": s.decay.delta} for s in loadings.swings
-            ],
-        },
     )  # fmt: skip
+    estimates = {"k": loadings.k, "bare": loadings.bare, "damping": loadings.damping}
+    numbers = {
+        **{name: plain_estimate(e) for name, e in estimates.items()},
+        "kind": kind,
+        "verdict": loadings.verdict,
+        "truth": truth,
+        "left_out": left_out,
+        "swings": [
+            {"label": s.label, "added": s.added, "omega_n": s.decay.omega_n, "stderr": s.decay.omega_error,
+             "sigma": s.decay.sigma, "delta": s.decay.delta} for s in loadings.swings
+        ],
+    }  # fmt: skip
+    return replace(page, sound=loadings.verdict.startswith("A line"), steps=tuple(steps), numbers=numbers)
 
 
-def _estimate_table(loadings: Loadings, kind: str, truth: Mapping[str, float]) -> Table:
-    """What was found, beside the truth where a twin tells it."""
-    named = (
-        ("k", "stiffness", loadings.k, "stiffness"),
-        (BODIES[kind].bare, "inertia of the bare body", loadings.bare, "inertia"),
-        ("c", "viscous friction", loadings.damping, "damping"),
-    )
-    rows = tuple(
-        (
-            Symbol(name), *((number(truth[name], figures(w.value, w.stderr)),) if truth else ()),
-            *with_error(w.value, w.stderr), interval(w), unit(_unit(kind, what)), meaning,
-        )
-        for name, meaning, w, what in named
-    )  # fmt: skip
-    repeat = "" if np.isnan(loadings.repeat) else f"; repeats of one loading agree to {50 * loadings.repeat:.2g} %"
-    return Table(
-        caption=f"From {len(loadings.swings)} swings" + (f"{repeat} of the frequency" if repeat else ""),
-        headings=(
-            "symbol", *(("truth of the twin",) if truth else ()), "value", "std. error", "95 % interval", "unit",
-            "meaning",
-        ),
-        rows=rows, numbers=(1, 2, 3, 4) if truth else (1, 2, 3),
-    )  # fmt: skip
-
-
-def _swing_table(loadings: Loadings, kind: str) -> Table:
-    rows = tuple(
-        (
-            s.label, number(s.added), str(s.decay.t.size), number(s.decay.omega_n, 5),
-            number(s.decay.omega_error, 2), number(s.decay.decrement, 3), number(s.decay.zeta, 3),
-            f"{number(s.decay.delta, 3)} ± {number(s.decay.delta_error, 2)}",
-        )
-        for s in loadings.swings
-    )  # fmt: skip
-    return Table(
-        caption="Every swing; δ in the unit of the log",
-        headings=(
-            "swing", f"added [{unit(_unit(kind, 'inertia'))}]", "extremes", "ω [rad/s]", "std. error",
-            "log. decrement", "damping ratio", "δ",
-        ),
-        rows=rows, numbers=tuple(range(1, 8)),
-    )  # fmt: skip
-
-
-def _swing_pictures(loadings: Loadings, logs: Mapping[str, Record], signals: Mapping[str, str]) -> list[Picture]:
-    """One swing of each loading, and their decrements."""
+def _one_of_each(loadings: Loadings) -> list[Loaded]:
+    """The first swing of each loading, the lightest first."""
     first: dict[float, Loaded] = {}
     for s in loadings.swings:
         first.setdefault(s.added, s)
-    shown = [first[a] for a in sorted(first)][:MOST_PANELS]
-    labels = [s.label.rsplit(", step ", 1)[0] for s in shown]
-    with_logs = [(s, logs[n], signals[n]) for s, n in zip(shown, labels, strict=True) if n in logs]
-    pictures = [
-        Picture(
-            name="decrements", draw=lambda: decrement_figure(shown),
-            caption="Height of the extremes above the centre. A straight thin line is what the viscous part alone "
-            "would leave; dry friction bends the decrement downwards.",
-            description="Logarithmic decay of the heights, one curve per loading.",
-        )
-    ]  # fmt: skip
-    if not with_logs:
-        return pictures
-    swings = Picture(
-        name="swings", draw=lambda: extremes_figure(with_logs),
-        caption="One swing of each loading. Rings: extremes, from the exact shape about each; crosses: the "
-        "recursion of a spring with viscous and dry friction. Grey: where dry friction can hold the body.",
-        description=f"{len(with_logs)} decaying swings with their extremes marked.",
-    )  # fmt: skip
-    return [swings, *pictures]
+    return [first[a] for a in sorted(first)][:MOST_PANELS]
 
 
 def _unit(kind: str, what: str) -> str:

@@ -18,6 +18,7 @@ from upright.errors import BadInput
 from upright.exports.controller import harmless
 from upright.exports.fmu.source import fmu_source
 from upright.exports.fmu.unit import STEP, Unit, Variable
+from upright.exports.texts import filled
 
 NAME = "rig"
 _ENDINGS = {"Linux": ("linux", "so"), "Darwin": ("darwin", "dylib"), "Windows": ("windows", "dll")}
@@ -31,7 +32,7 @@ def archive(unit: Unit) -> tuple[bytes, str]:
     files = {
         "modelDescription.xml": model_description(unit, token).encode(),
         f"sources/{NAME}.c": text.encode(),
-        "sources/buildDescription.xml": _BUILD.encode(),
+        "sources/buildDescription.xml": filled("buildDescription.xml.in", identifier=NAME).encode(),
     }
     library = compiled_library(text)
     system, ending = _ENDINGS.get(platform.system(), ("", ""))
@@ -89,19 +90,11 @@ def model_description(unit: Unit, token: str) -> str:
         outputs += [str(number)] if v.causality == "output" else []
     units = sorted({v.unit for v in [*unit.inputs, *unit.states, *unit.parameters] if v.unit} | {"s"})
     structure = [f'    <{kind} valueReference="{n}"/>' for kind in ("Output", "InitialUnknown") for n in outputs]
-    return "\n".join([
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(unit.rig.name)} instantiationToken="{token}"',
-        f'    generationTool="upright {__version__}" variableNamingConvention="flat"{description}>',
-        f'  <CoSimulation modelIdentifier="{NAME}" canHandleVariableCommunicationStepSize="true"',
-        f'      fixedInternalStepSize="{STEP!r}"/>',
-        "  <UnitDefinitions>", *(f"    <Unit name={quoteattr(u)}/>" for u in units), "  </UnitDefinitions>",
-        '  <LogCategories>', '    <Category name="logStatusError"/>', "  </LogCategories>",
-        f'  <DefaultExperiment startTime="0.0" stopTime="5.0" stepSize="{10 * STEP!r}"/>',
-        "  <ModelVariables>", *variables, "  </ModelVariables>",
-        "  <ModelStructure>", *structure, "  </ModelStructure>",
-        "</fmiModelDescription>", "",
-    ])  # fmt: skip
+    return filled(
+        "modelDescription.xml.in", name=quoteattr(unit.rig.name), token=token, identifier=NAME, version=__version__,
+        step=repr(STEP), description=description, units="\n".join(f"    <Unit name={quoteattr(u)}/>" for u in units),
+        experiment_step=repr(10 * STEP), variables="\n".join(variables), structure="\n".join(structure),
+    )  # fmt: skip
 
 
 def _variable(v: Variable, number: int) -> str:
@@ -113,15 +106,3 @@ def _variable(v: Variable, number: int) -> str:
         "parameter": f'causality="parameter" variability="fixed" initial="exact" start="{v.value!r}"',
     }[v.causality]
     return f"    <Float64 {about} {kind}/>"
-
-
-_BUILD = f"""\
-<?xml version="1.0" encoding="UTF-8"?>
-<fmiBuildDescription fmiVersion="3.0">
-  <BuildConfiguration modelIdentifier="{NAME}">
-    <SourceFileSet language="C99">
-      <SourceFile name="{NAME}.c"/>
-    </SourceFileSet>
-  </BuildConfiguration>
-</fmiBuildDescription>
-"""

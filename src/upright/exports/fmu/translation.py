@@ -8,11 +8,13 @@ The kernel's writer keeps to that part; a construct beyond it is refused, never 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 from upright.errors import BadInput
+from upright.exports.texts import filled
 from upright.simulation.lowering.instructions import LARGEST_POWER
 
 Kind = Literal["long", "double", "double *", "long *"]
@@ -32,41 +34,11 @@ _KEYWORDS = {
     "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while",
 }  # fmt: skip
 
-_HELPERS = (
-    "static long least_l(long a, long b) { return b < a ? b : a; }\n",
-    "static long most_l(long a, long b) { return b > a ? b : a; }\n",
-    "static double least_d(double a, double b) { return b < a ? b : a; }\n",
-    "static double most_d(double a, double b) { return b > a ? b : a; }\n",
-    "static long quotient_l(long a, long b) { return b ? a / b - (a % b && (a < 0) != (b < 0)) : 0; }\n",
-    "static long rest_l(long a, long b) { return b ? a % b + (a % b && (a < 0) != (b < 0) ? b : 0) : 0; }\n",
-    "static double rest_d(double a, double b) { double r = fmod(a, b); return r && (r < 0) != (b < 0) ? r + b : r; }\n",
-    """\
-static long round_l(double x)
-{
-    const double whole = floor(x), rest = x - whole;
-    return (long)(rest > 0.5 || (rest == 0.5 && fmod(whole, 2) != 0) ? whole + 1 : whole);
-}
-""",
-    """\
-static double power_d(double x, int n)
-{
-    double out = n & 1 ? x : 1;
-    while (n >>= 1) {
-        x *= x;
-        out = n & 1 ? out * x : out;
-    }
-    return out;
-}
-""",
-    "static void parted_d(double x, double *result) { int n; result[0] = frexp(x, &n); result[1] = n; }\n",
-)
-"""Small functions by which C does as the kernel does: the first of two unless the second is better, whole quotients
-towards minus infinity, halves rounded to even, whole powers by products, `frexp` with both its results."""
-
 
 def helpers(text: str) -> str:
-    """Those that a text calls."""
-    return "".join(h for h in _HELPERS if f"{h.split('(')[0].split()[-1]}(" in text)
+    """Functions of ``arithmetic.c`` that a text calls."""
+    own = re.split(r"\n\n(?=static)", filled("arithmetic.c").strip())[1:]
+    return "".join(f"{h}\n" for h in own if f"{h.partition('(')[0].split()[-1]}(" in text)
 
 
 @dataclass

@@ -8,20 +8,10 @@ from upright.exports import rule
 from upright.exports.arithmetic import Language, check_inputs, output_lines, statements
 from upright.exports.controller import SampledController, identifiers
 from upright.exports.targets import LawTarget
+from upright.exports.texts import filled, indented
 from upright.exports.vector import ReplayVector
 from upright.laws import Rule
 from upright.laws.linear import Array
-
-_EXACT = """\
-/* Products and sums are rounded one by one, as where the law was designed; a processor's fused ones differ in bits. */
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__)
-#pragma GCC optimize("fp-contract=off")
-#elif defined(_MSC_VER)
-#pragma fp_contract(off)
-#endif
-"""
 
 
 def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
@@ -30,7 +20,7 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
         "law.h": header(made, single=single),
         "law.c": c_source(made, single=single),
         "law_selftest.h": selftest_header(test, single=single),
-        "law_selftest.c": _MAIN,
+        "law_selftest.c": filled("law_selftest.c"),
     }
 
 
@@ -47,41 +37,12 @@ def header(made: SampledController, *, single: bool) -> str:
     listed += [f"r[{c}] is {name}" for c, name in enumerate(made.references)]
     listed += [f"u[{j}] is {name}{_in(made.command_unit)}" for j, name in enumerate(made.commands)]
     about = "\n".join(f"   {fact}" for fact in made.facts)
-    return f"""\
-/* {made.title}, written by upright export.
-
-{about} */
-#ifndef LAW_H
-#define LAW_H
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
-typedef {"float" if single else "double"} law_real;
-
-#define LAW_PERIOD {constant(made.law.period, single)} /* between two samples [s] */
-#define LAW_READINGS {len(made.readings)}
-#define LAW_REFERENCES {len(made.references)}
-#define LAW_COMMANDS {len(made.commands)}
-{steps}
-typedef struct {{
-    law_real z[{max(made.memories, 1)}];
-    {"unsigned long samples" if isinstance(made.law, Rule) else "int running"};
-    int stopped; /* by a reading, reference or command that is not finite: every command is zero until law_start */
-}} law_state;
-
-/* Before the first sample: forget, so that no jump is taken for a speed. */
-void law_start(law_state *s);
-
-/* One sample: {"; ".join(listed)}. */
-void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u);
-
-#ifdef __cplusplus
-}}
-#endif
-#endif
-"""
+    return filled(
+        "law.h.in", title=made.title, about=about, real="float" if single else "double",
+        period=constant(made.law.period, single), readings=len(made.readings), references=len(made.references),
+        commands=len(made.commands), steps=steps, memories=max(made.memories, 1), listed="; ".join(listed),
+        progress="unsigned long samples" if isinstance(made.law, Rule) else "int running",
+    )  # fmt: skip
 
 
 def c_source(made: SampledController, *, single: bool) -> str:
@@ -97,108 +58,23 @@ def c_source(made: SampledController, *, single: bool) -> str:
         stopped="s->stopped", not_finite="!is_finite({})".format,
         stop=lambda when: [f"if ({when}) {{", "    stop(s, u);", "    return;", "}"],
     )  # fmt: skip
-    if isinstance(made.law, Rule):
-        return _of_rule(made, check_inputs(made, say), output_lines(made, say), single=single)
-    body = "\n".join(f"    {line}".replace("law_real beyond", "int beyond") for line in statements(made, say))
-    unused = "" if made.references else "    (void)r;\n"
-    return f"""\
-/* {made.title}, written by upright export; see law.h. */
-{_EXACT}
-#include "law.h"
-
-#include <float.h>
-#include <math.h>
-#include <stdint.h>
-
-{_stop(single)}
-void law_start(law_state *s)
-{{
-    unsigned i;
-    for (i = 0; i < sizeof s->z / sizeof s->z[0]; i++)
-        s->z[i] = 0;
-    s->running = 0;
-    s->stopped = 0;
-}}
-
-void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
-{{
-{unused}{body}
-    s->running = 1;
-}}
-"""
+    rules = isinstance(made.law, Rule)
+    functions = _of_rule(made, check_inputs(made, say), output_lines(made, say)) if rules else filled(
+        "linear.c.in", unused="" if made.references else "    (void)r;\n",
+        body=indented(statements(made, say)).replace("law_real beyond", "int beyond"),
+    )  # fmt: skip
+    return filled("law.c.in", title=made.title, real="FLT" if single else "DBL", functions=functions)
 
 
-def _stop(single: bool) -> str:
-    return f"""\
-/* By its bits, since compilers may take it for granted that comparisons meet no NaN (-ffast-math). */
-static int is_finite(law_real x)
-{{
-#if {"FLT" if single else "DBL"}_MANT_DIG == 24
-    union {{ law_real value; uint32_t bits; }} as;
-    const uint32_t exponent = 0x7f800000;
-#else
-    union {{ law_real value; uint64_t bits; }} as;
-    const uint64_t exponent = 0x7ff0000000000000;
-#endif
-    as.value = x;
-    return (as.bits & exponent) != exponent;
-}}
-
-static void stop(law_state *s, law_real *u)
-{{
-    int j;
-    s->stopped = 1;
-    for (j = 0; j < LAW_COMMANDS; j++)
-        u[j] = 0;
-}}
-"""
-
-
-def _of_rule(made: SampledController, first: list[str], last: list[str], *, single: bool) -> str:
+def _of_rule(made: SampledController, first: list[str], last: list[str]) -> str:
     inputs, states = len(made.commands), made.memories
     parameters, initial = (", ".join(constant(x, False) for x in values) or "0" for values in rule.rule_numbers(made))
-    commands = "\n".join(f"    law_real c{j} = found[{j}];" for j in range(inputs))
-    checked, body = ("\n".join(f"    {line}" for line in lines) for lines in (first, last))
     copied = "for (i = 0; i < LAW_REFERENCES; i++)\n        asked[i] = r[i];" if made.references else "(void)r;"
-    return f"""\
-/* {made.title}, written by upright export; see law.h. */
-{_EXACT}
-#include "law.h"
-
-#include <float.h>
-#include <math.h>
-#include <stdint.h>
-
-{_stop(single)}
-{rule.in_c(made)}
-static double parameters[] = {{{parameters}}};
-static const double initial[] = {{{initial}}};
-
-void law_start(law_state *s)
-{{
-    unsigned i;
-    for (i = 0; i < sizeof initial / sizeof initial[0]; i++)
-        s->z[i] = initial[i];
-    s->samples = 0;
-    s->stopped = 0;
-}}
-
-void law_step(law_state *s, const law_real *y, const law_real *r, law_real *u)
-{{
-    double given[LAW_READINGS], asked[LAW_REFERENCES + 1] = {{0}}, found[{inputs + states}];
-    int i;
-{checked}
-    for (i = 0; i < LAW_READINGS; i++)
-        given[i] = y[i];
-    {copied}
-    k_rule(s->samples * LAW_PERIOD, given, asked, s->z, parameters, found);
-{commands}
-{body}
-    for (i = 0; i < {states}; i++)
-        s->z[i] = found[{inputs} + i];
-    s->samples++;
-}}
-"""
+    return filled(
+        "rule.c.in", rule=rule.in_c(made), parameters=parameters, initial=initial, numbers=inputs + states,
+        checked=indented(first), body=indented(last), copied=copied, inputs=inputs, states=states,
+        commands=indented(f"law_real c{j} = found[{j}];" for j in range(inputs)),
+    )  # fmt: skip
 
 
 def selftest_header(test: ReplayVector, *, single: bool) -> str:
@@ -207,81 +83,11 @@ def selftest_header(test: ReplayVector, *, single: bool) -> str:
     readings = _table("given", test.readings, single)
     references = _table("asked", test.references, single) if test.references.shape[1] else ""
     reference, at_first = ("asked[k]", "asked[0]") if references else ("0", "0")
-    exact = "0" if single else "LAW_EXACT"
-    return f"""\
-/* {count} samples with the commands that upright's own kernel answers, to be replayed wherever the law runs. */
-#ifndef LAW_SELFTEST_H
-#define LAW_SELFTEST_H
-
-#include "law.h"
-
-#include <float.h>
-#include <math.h>
-#include <string.h>
-
-/* Bit for bit in double precision. In single precision, where double means single, and on processors that keep more
-   digits than a double has (FLT_EVAL_METHOD), rounding may add up to: */
-#define LAW_SINGLE_MISSES {constant(test.single, single)}
-#if defined(FLT_EVAL_METHOD) && (FLT_EVAL_METHOD < 0 || FLT_EVAL_METHOD > 1)
-#define LAW_EXACT 0
-#else
-#define LAW_EXACT (sizeof(law_real) >= 8)
-#endif
-
-/* The first sample whose command is not the expected one, -1 when all are.
-   Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start. */
-static long law_selftest(void)
-{{
-{readings}{references}{_table("expected", test.commands, single)}\
-    const law_real allowed = ({exact}) ? 0 : LAW_SINGLE_MISSES;
-    static const law_real bad[] = {{NAN, INFINITY, -INFINITY}}, zero[LAW_COMMANDS] = {{0}};
-    law_real y[LAW_READINGS], u[LAW_COMMANDS];
-    law_state s;
-    long k;
-    int j, run;
-    for (run = 0; run < 3 * LAW_READINGS; run++) {{
-        law_start(&s);
-        for (k = 0; k < {count}; k++) {{
-            law_step(&s, given[k], {reference}, u);
-            for (j = 0; j < LAW_COMMANDS; j++) {{
-                const law_real off = u[j] - expected[k][j];
-                if (!(off <= allowed && -off <= allowed))
-                    return k;
-            }}
-        }}
-        memcpy(y, given[0], sizeof y);
-        y[run / 3] = bad[run % 3];
-        law_step(&s, y, {at_first}, u);
-        if (memcmp(u, zero, sizeof u) != 0)
-            return {count};
-        law_step(&s, given[0], {at_first}, u);
-        if (memcmp(u, zero, sizeof u) != 0)
-            return {count + 1};
-    }}
-    return -1;
-}}
-
-#endif
-"""
-
-
-_MAIN = """\
-/* cc -std=c99 -O2 law.c law_selftest.c -lm && ./a.out */
-#include "law_selftest.h"
-
-#include <stdio.h>
-
-int main(void)
-{
-    const long wrong = law_selftest();
-    if (wrong >= 0) {
-        printf("law: sample %ld is not the expected one; do not run it\\n", wrong);
-        return 1;
-    }
-    printf("law: every sample is the expected one\\n");
-    return 0;
-}
-"""
+    return filled(
+        "law_selftest.h.in", count=count, beyond=count + 1, misses=constant(test.single, single), readings=readings,
+        references=references, expected=_table("expected", test.commands, single), reference=reference,
+        at_first=at_first, exact="0" if single else "LAW_EXACT",
+    )  # fmt: skip
 
 
 def constant(x: float, single: bool) -> str:

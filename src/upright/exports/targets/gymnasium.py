@@ -9,6 +9,7 @@ from pathlib import Path
 from upright.exports.controller import harmless
 from upright.exports.episodes import DRAWS, Episodes
 from upright.exports.targets import RigExport, RigTarget
+from upright.exports.texts import filled
 from upright.report.page import Chapter, Part, Points, Step
 from upright.report.symbols import number, typed
 
@@ -21,31 +22,8 @@ def module(rig: str, fit: str, limit: float | None, first_line: str = "") -> tup
     name = f"upright/{''.join(c for c in rig.rpartition(':')[2] if c.isalnum()) or 'rig'}-v0"
     head = harmless(f"{first_line} ".lstrip())
     options = "" if limit is None else f', "limit": {limit!r}'
-    return (
-        name,
-        f'''\
-"""{head}The rig of {Path(fit).name} as an environment of Gymnasium, written by upright export."""
-
-from pathlib import Path
-
-import gymnasium
-
-gymnasium.register(
-    id="{name}",
-    entry_point="upright.exports.environment:RigEnv",
-    vector_entry_point="upright.exports.environment:RigVectorEnv",
-    max_episode_steps=500,
-    kwargs={{"fit": str(Path(__file__).parent / {Path(fit).as_posix()!r}){options}}},
-)
-
-if __name__ == "__main__":
-    env = gymnasium.make_vec("{name}", num_envs=1024)
-    env.reset(seed=0)
-    env.action_space.seed(0)
-    ends = sum(int(env.step(env.action_space.sample())[2].sum()) for _ in range(100))
-    print(f"{{env.num_envs}} rigs, 100 steps each, random commands: {{ends}} falls")
-''',
-    )
+    return name, filled("rig_env.py.in", head=head, file=Path(fit).name, name=name, path=repr(Path(fit).as_posix()),
+                        options=options)  # fmt: skip
 
 
 def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:

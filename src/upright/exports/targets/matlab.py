@@ -7,6 +7,7 @@ import numpy as np
 from upright.exports.arithmetic import Language, statements
 from upright.exports.controller import SampledController
 from upright.exports.targets import LawTarget
+from upright.exports.texts import filled, indented
 from upright.exports.vector import ReplayVector
 from upright.laws.linear import Array
 
@@ -18,7 +19,11 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
 
 def simulink_block(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name for Simulink: the same function, a level-2 S-function that calls it, what makes its block."""
-    return {**files(made, test, single=single), "law_sfun.m": _s_function(made, single=single), "law_block.m": _BLOCK}
+    return {
+        **files(made, test, single=single),
+        "law_sfun.m": _s_function(made, single=single),
+        "law_block.m": filled("law_block.m"),
+    }
 
 
 def step_function(made: SampledController, *, single: bool) -> str:
@@ -33,60 +38,22 @@ def step_function(made: SampledController, *, single: bool) -> str:
         stopped="s.stopped", not_finite="~isfinite({})".format,
         stop=lambda when: [f"if {when}", "    s.stopped = true;", "    return;", "end"],
     )  # fmt: skip
-    body = "\n".join(f"    {line}" for line in statements(made, say))
-    about = "\n".join(f"% {fact}" for fact in made.facts)
-    with_r = ", r" if made.references else ""
-    return f"""\
-function [u, s] = law_step(s, y{with_r})
-% Commands u and memory s of one sample; s is [] before the first, so that no jump is taken for a speed.
-% A reading, reference or command that is not finite sets s.stopped: u is zero until s is [] again.
-% {made.title}, written by upright export.
-{about}
-%#codegen
-    if isempty(s)
-        s = struct('z', zeros({max(made.memories, 1)}, 1, '{number}'), 'running', false, 'stopped', false);
-    end
-    y = {number}(y);
-    u = zeros({len(made.commands)}, 1, '{number}');
-{body}
-    s.running = true;
-end
-"""
+    return filled(
+        "law_step.m.in", with_r=", r" if made.references else "", title=made.title, number=number,
+        about="\n".join(f"% {fact}" for fact in made.facts), memories=max(made.memories, 1),
+        commands=len(made.commands), body=indented(statements(made, say)),
+    )  # fmt: skip
 
 
 def selftest_function(test: ReplayVector, *, single: bool) -> str:
     """Text of ``law_selftest.m``."""
     with_r, first_r = (", asked(k, :)", ", asked(1, :)") if test.references.shape[1] else ("", "")
     references = _table("asked", test.references) if with_r else ""
-    return f"""\
-function law_selftest()
-% Compares the commands of a replay with those that upright's own kernel answers.
-% Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start.
-{_table("given", test.readings)}{references}{_table("expected", test.commands)}\
-    allowed = {f"{test.single if single else 0.0:.17g}"};
-    wrong = 'law: sample %d is not the expected one; do not run it';
-    bad = [NaN, Inf, -Inf];
-    for run = 1:3 * size(given, 2)
-        s = [];
-        for k = 1:size(given, 1)
-            [u, s] = law_step(s, given(k, :){with_r});
-            if ~all(abs(double(u(:)).' - expected(k, :)) <= allowed)
-                error('law:selftest', wrong, k);
-            end
-        end
-        y = given(1, :);
-        y(ceil(run / 3)) = bad(mod(run, 3) + 1);
-        for k = 1:2
-            [u, s] = law_step(s, y{first_r});
-            if ~all(u(:) == 0)
-                error('law:selftest', wrong, size(given, 1) + k);
-            end
-            y = given(1, :);
-        end
-    end
-    disp('law: every sample is the expected one');
-end
-"""
+    return filled(
+        "law_selftest.m.in", given=_table("given", test.readings), references=references, with_r=with_r,
+        first_r=first_r, expected=_table("expected", test.commands),
+        allowed=f"{test.single if single else 0.0:.17g}",
+    )  # fmt: skip
 
 
 def _table(name: str, rows: Array) -> str:
@@ -96,66 +63,17 @@ def _table(name: str, rows: Array) -> str:
 
 def _s_function(made: SampledController, *, single: bool) -> str:
     """Text of ``law_sfun.m``, which keeps memory in Simulink's own, so that stored states can be restored."""
-    m, z, number = len(made.references), max(made.memories, 1), "single" if single else "double"
-    r = ", block.InputPort(2).Data" if m else ""
+    m = len(made.references)
     second = (
         f"    block.InputPort(2).Dimensions = {m};\n    block.InputPort(2).DirectFeedthrough = true;\n" if m else ""
     )
-    return f"""\
-function law_sfun(block)
-% Level-2 S-function around law_step; {made.title}, written by upright export.
-% In: {", ".join(made.readings)}{"; then " + ", ".join(made.references) if m else ""}. Out: {", ".join(made.commands)}.
-    block.NumDialogPrms = 0;
-    block.NumInputPorts = {2 if m else 1};
-    block.NumOutputPorts = 1;
-    block.SetPreCompInpPortInfoToDynamic;
-    block.SetPreCompOutPortInfoToDynamic;
-    block.InputPort(1).Dimensions = {len(made.readings)};
-    block.InputPort(1).DirectFeedthrough = true;
-{second}    block.OutputPort(1).Dimensions = {len(made.commands)};
-    block.SampleTimes = [{made.law.period:.17g} 0];
-    block.RegBlockMethod('PostPropagationSetup', @allocate);
-    block.RegBlockMethod('Start', @start);
-    block.RegBlockMethod('Outputs', @outputs);
-    block.RegBlockMethod('Update', @update);
-end
+    return filled(
+        "law_sfun.m.in", title=made.title, readings=", ".join(made.readings), commands=", ".join(made.commands),
+        then="; then " + ", ".join(made.references) if m else "", ports=2 if m else 1, inputs=len(made.readings),
+        second=second, outputs=len(made.commands), period=f"{made.law.period:.17g}", kept=max(made.memories, 1) + 2,
+        r=", block.InputPort(2).Data" if m else "", number="single" if single else "double",
+    )  # fmt: skip
 
-function allocate(block)
-    block.NumDworks = 1;
-    block.Dwork(1).Name = 'memory';
-    block.Dwork(1).Dimensions = {z + 2};
-    block.Dwork(1).DatatypeID = 0;
-    block.Dwork(1).Complexity = 'Real';
-    block.Dwork(1).UsedAsDiscState = true;
-end
-
-function start(block)
-    block.Dwork(1).Data = zeros({z + 2}, 1);
-end
-
-function outputs(block)
-    block.OutputPort(1).Data = double(law_step(memory(block), block.InputPort(1).Data{r}));
-end
-
-function update(block)
-    [~, s] = law_step(memory(block), block.InputPort(1).Data{r});
-    block.Dwork(1).Data = [double(s.z); double(s.running); double(s.stopped)];
-end
-
-function s = memory(block)
-    kept = block.Dwork(1).Data;
-    s = struct('z', {number}(kept(1:end - 2)), 'running', kept(end - 1) ~= 0, 'stopped', kept(end) ~= 0);
-end
-"""
-
-
-_BLOCK = """\
-% Makes a model with the law as a block, to be copied into one's own; law_step.m and law_sfun.m must be on the path.
-law_selftest();
-new_system('law_model');
-add_block('simulink/User-Defined Functions/Level-2 MATLAB S-Function', 'law_model/law', 'FunctionName', 'law_sfun');
-open_system('law_model');
-"""
 
 MATLAB = LawTarget(
     name="matlab", order=25, title="MATLAB and GNU Octave", write=files,

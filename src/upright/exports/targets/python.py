@@ -7,6 +7,7 @@ from upright.exports import rule
 from upright.exports.arithmetic import Language, check_inputs, output_lines, statements
 from upright.exports.controller import SampledController
 from upright.exports.targets import LawTarget
+from upright.exports.texts import filled, indented
 from upright.exports.vector import ReplayVector
 from upright.laws import Rule
 
@@ -25,7 +26,6 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
     """Text by file name."""
     if single:
         raise BadInput("Python's numbers are doubles; leave --float out, or take the target c.")
-    about = "\n".join(made.facts)
     if isinstance(made.law, Rule):
         needs = "from math import floor, frexp, inf, isfinite, nan, pi, sqrt\n\n"
         before = f"\n\n{rule.in_python(made)}\n"
@@ -46,69 +46,12 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
         floor = "floor, " * any("floor(" in line for line in lines)
         needs = f"from math import {floor}inf, isfinite, nan\n\n"
     begin.append("self.stopped = False")
-    first, body = ("\n".join(f"        {line}" for line in part) for part in (begin, lines))
     rows = zip(test.readings.tolist(), test.references.tolist(), test.commands.tolist(), strict=True)
-    table = "\n".join(f"    ({y}, {r}, {u})," for y, r, u in rows)
-    return {
-        "law.py": f'''\
-"""{made.title}, written by upright export.
-
-{about}
-Run this file to test it: the commands are compared with those of upright's own kernel, bit for bit.
-"""
-
-{needs}PERIOD = {made.law.period!r}
-READINGS = {made.readings!r}
-REFERENCES = {made.references!r}
-COMMANDS = {made.commands!r}
-{before}
-
-class Law:
-    """One run of the law; make another one for the next run.
-
-    A reading, reference or command that is not finite ends the run: `stopped`, and every command is zero from there on.
-    """
-
-    def __init__(self):
-{first}
-
-    def step(self, y, r=()):
-        """Commands for the readings `y` and references `r` of one sample."""
-{body}
-        return u
-
-
-SELF_TEST = (  # readings, references, expected commands
-{table}
-)
-
-
-def self_test():
-    """Number of the first sample whose command is not the expected one, None when all are.
-
-    Behind the samples comes a reading that is not finite, and a good one: both commands are zero, until a new start.
-    """
-    count, (y, r, _), zero = len(SELF_TEST), SELF_TEST[0], [0.0] * len(COMMANDS)
-    for i in range(len(READINGS)):
-        for bad in (nan, inf, -inf):
-            law = Law()
-            for k, (readings, references, expected) in enumerate(SELF_TEST):
-                if law.step(readings, references) != expected:
-                    return k
-            if law.step([*y[:i], bad, *y[i + 1 :]], r) != zero:
-                return count
-            if law.step(y, r) != zero:
-                return count + 1
-    return None
-
-
-if __name__ == "__main__":
-    wrong = self_test()
-    if wrong is not None:
-        raise SystemExit(f"law: sample {{wrong}} is not the expected one; do not run it")
-    print("law: every sample is the expected one")
-'''
-    }
+    return {"law.py": filled(
+        "law.py.in", title=made.title, about="\n".join(made.facts), needs=needs, period=repr(made.law.period),
+        readings=repr(made.readings), references=repr(made.references), commands=repr(made.commands), before=before,
+        first=indented(begin, 8), body=indented(lines, 8), table=indented(f"({y}, {r}, {u})," for y, r, u in rows),
+    )}  # fmt: skip
 
 
 TARGET = LawTarget(

@@ -30,7 +30,7 @@ from upright.identification.model.bands import LEVEL, NORMAL, Bands, Spread
 from upright.identification.model.fit import RunScore
 from upright.identification.model.grey_box import NOISE, GreyBox, Parameter
 from upright.identification.model.runs import LEAST_RUN, Run
-from upright.identification.problem.normal_equations import finite, pseudo_inverse, slopes
+from upright.identification.problem.normal_equations import finite, pseudo_inverse, slopes, to_one
 from upright.identification.problem.residuals import ROUNDING, Problem, formulate
 from upright.identification.problem.tracks import Track
 from upright.identification.problem.unknowns import friction_names
@@ -125,8 +125,7 @@ def calibrated(best: Optimum) -> Bands | None:
 def possible(C: Array) -> Array:
     """The covariance (n, n) that is nearest to one which rounding has left asymmetric, or a little indefinite."""
     C = (C + C.T) / 2
-    d = np.sqrt(np.maximum(np.diag(C), 0.0))
-    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+    s = to_one(C)
     if not C.size or np.linalg.eigvalsh(C * s[:, None] * s)[0] >= 0:
         return C
     L = matrix_root(C)

@@ -13,6 +13,7 @@ from upright.identification.inference.covariance import Optimum
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import GreyBox
+from upright.identification.problem.normal_equations import to_one
 
 Array = NDArray[np.float64]
 
@@ -76,10 +77,11 @@ def matrix_root(C: Array) -> Array:
             np.linalg.cholesky(C + 1e-12 * np.diag(np.diag(C)) + 1e-300 * np.eye(len(C))), dtype=np.float64
         )
     except np.linalg.LinAlgError:
-        d = np.sqrt(np.maximum(np.diag(C), 0.0))
-        s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+        s = to_one(C)
         w, V = np.linalg.eigh(C * s[:, None] * s)
-        return np.asarray(d[:, None] * V * np.sqrt(np.maximum(w, 0.0)), dtype=np.float64)
+        return np.asarray(
+            np.sqrt(np.maximum(np.diag(C), 0.0))[:, None] * V * np.sqrt(np.maximum(w, 0.0)), dtype=np.float64
+        )
 
 
 def placed(A: Array, b: Array, wanted: Array) -> Array | None:

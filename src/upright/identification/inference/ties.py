@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from upright.identification.inference.covariance import Optimum
 from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import NOISE
-from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.normal_equations import correlation, pseudo_inverse
 from upright.quantities import figures
 
 Array = NDArray[np.float64]
@@ -73,7 +73,8 @@ def ties(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Tie, ...]:
     others = [int(i) for i in np.flatnonzero(~best.pinned) if i not in places]
     every = [*places, *others]
     off = pseudo_inverse(best.matrix[np.ix_(every, every)])[: len(places), : len(places)] * np.outer(slope, slope)
-    R = np.where(moving, _correlation(C), np.where(np.outer(pinned, pinned), 0.0, _correlation(off)))
+    R = np.where(moving, correlation(C), np.where(np.outer(pinned, pinned), 0.0, correlation(off)))
+    np.fill_diagonal(R, 0.0)
     pairs: dict[tuple[int, int], float] = {}
     for a in range(len(places)):
         b = int(np.argmax(np.abs(R[a])))
@@ -90,13 +91,6 @@ def ties(best: Optimum, estimates: Mapping[str, Estimate]) -> tuple[Tie, ...]:
         together = Estimate.within(value, error, best.quantile * error, estimates[first].unit)
         out.append(Tie(first=first, second=second, correlation=rho, factor=factor, together=together))
     return tuple(out)
-
-
-def _correlation(C: Array) -> Array:
-    """Correlations (n, n) of a covariance, nothing on the diagonal."""
-    size = np.sqrt(np.maximum(np.diag(C), 0.0))
-    R = C / np.where(np.outer(size, size) > 0, np.outer(size, size), np.inf)
-    return R - np.diag(np.diag(R))
 
 
 def with_ties(estimates: Mapping[str, Estimate], tied: Sequence[Tie]) -> dict[str, Estimate]:

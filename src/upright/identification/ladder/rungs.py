@@ -104,12 +104,7 @@ def _present(rig: GreyBox, name: str) -> bool:
 
 
 def check_rungs(rig: GreyBox, rungs: Sequence[Rung]) -> None:
-    """Refuse rungs that add what was not requested, or the same term twice.
-
-    Raises
-    ------
-    BadInput
-    """
+    """Refuse rungs that add what was not requested, or the same term twice."""
     added: set[str] = set()
     for rung in rungs:
         for n in (*rung.adds, *rung.drops):

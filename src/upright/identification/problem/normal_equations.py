@@ -131,10 +131,23 @@ def products(J: Array, r: Array) -> tuple[Array, Array, float]:
     return total[:-1, :-1], total[:-1, -1], float(total[-1, -1])
 
 
+def to_one(A: Array) -> Array:
+    """Factors (n,) of rows and columns that bring the diagonal of a matrix (n, n) to one; 0 where it has nothing."""
+    d = np.sqrt(np.maximum(np.diag(A), 0.0))
+    return np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+
+
+def correlation(C: Array) -> Array:
+    """Correlations (n, n) of a covariance, one with itself also of what does not scatter."""
+    s = to_one(C)
+    R = C * s[:, None] * s
+    np.fill_diagonal(R, 1.0)
+    return R
+
+
 def pseudo_inverse(A: Array) -> Array:
     """Inverse of a Gauss-Newton matrix in the directions that it sees; columns scaled to one first."""
-    d = np.sqrt(np.maximum(np.diag(A), 0.0))
-    s = np.where(d > 0, 1 / np.where(d > 0, d, 1.0), 0.0)
+    s = to_one(A)
     w, V = np.linalg.eigh(A * s[:, None] * s)
     keep = w > NULL**2 * max(float(w[-1]), 0.0) if w.size else np.zeros(0, dtype=bool)
     inverse = (V[:, keep] / w[keep]) @ V[:, keep].T

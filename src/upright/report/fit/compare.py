@@ -47,7 +47,6 @@ class Comparison:
 
     Attributes
     ----------
-    runs : mapping of str to ComparedRun
     parameters : mapping of str to (mapping of str to Estimate)
         By fit and name.
     agree : mapping of str to (mapping of str to ParameterAgreement)

@@ -67,7 +67,6 @@ def traces(
     ----------
     t : array, shape (N,)
         Times [s], or what else the abscissa is.
-    panels : sequence of TracePanel
     name : str
         What is shown, for readers who cannot see it.
     restarts : float, optional

@@ -24,7 +24,6 @@ class Routine:
     ----------
     text : str
         Of a module, as `Module` takes it.
-    name : str
     *given : array, float or int
         Its arguments; arrays of float64 or int64 whose numbers lie one behind the other.
     """

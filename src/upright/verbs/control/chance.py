@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Unpack
 
-import numpy as np
-
 from upright.errors import BadInput
 from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, LET_GO, renamed
 from upright.verbs.answer import Answer
+from upright.verbs.linear.motion import read_gains
 from upright.verbs.options import TrialOptions, known_options, rig_entries
 from upright.verbs.values import read_start
 
@@ -85,12 +84,8 @@ def chance(
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
-    try:
-        K = np.atleast_2d(np.asarray(gains, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise BadInput(f"chance takes gains, a number for each state, got {gains!r:.40}.") from None
-    if K.shape != (1, len(model.states)):
-        raise BadInput(f"gains for {known.name} need shape {(1, len(model.states))}, got {K.shape}.")
+    refusal = f"chance takes gains, a number for each state, got {gains!r:.40}."
+    K = read_gains(gains, (1, len(model.states)), known.name, refusal)
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
     law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.resolution), K)
     let_go = dict(zip(("theta", "theta_dot"), usual, strict=True))

@@ -198,19 +198,14 @@ def _covariance(fit: StoredFit, estimates: Mapping[str, Any], common: Sequence[s
     import numpy as np
 
     from upright.identification.inference.agreement import TWO_SIDED
+    from upright.identification.problem.normal_equations import correlation
 
     names, C = fit.covariance(common)
-    out = np.zeros((len(common), len(common)))
-    size = np.sqrt(np.maximum(np.diag(C), 0.0))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        R = np.where(np.outer(size, size) > 0, C / np.outer(size, size), 0.0)
-    wide = {n: max(estimates[n].stderr, (estimates[n].interval[1] - estimates[n].interval[0]) / 2 / TWO_SIDED)
-            for n in common}  # fmt: skip
-    for i, a in enumerate(common):
-        for j, b in enumerate(common):
-            r = 1.0 if i == j else R[names.index(a), names.index(b)] if a in names and b in names else 0.0
-            out[i, j] = r * wide[a] * wide[b]
-    return out
+    places, R = [common.index(n) for n in names], np.eye(len(common))
+    R[np.ix_(places, places)] = correlation(C)
+    ends = ((estimates[n].stderr, estimates[n].interval) for n in common)
+    wide = np.array([max(stderr, (high - low) / 2 / TWO_SIDED) for stderr, (low, high) in ends])
+    return R * np.outer(wide, wide)
 
 
 def _logs(fit: StoredFit) -> set[str]:
