@@ -15,6 +15,7 @@ from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, Mode, TwinPort
 from upright.rigs.supervisor import Duty, Supervisor
+from upright.simulation import simulate
 
 TRAVEL = {"furuta": 1.2, "linear": 0.15}
 COAST = 0.35  # s, in which a pendulum falls through the bottom
@@ -124,6 +125,20 @@ def test_a_body_under_its_pendulum_needs_its_speed_squared_over_twice_its_decele
     p = 2.0 + way * share * 0.5
     moved = 0.1 + p * (0.005 + 6 * rig.period) + p**2 / (2 * a) + sway
     assert braking.farthest(x, 3.0)[0] == pytest.approx(moved, rel=1e-9)
+
+
+@pytest.mark.parametrize(("make", "v", "far"), [("furuta", 5.0, 9.0), ("linear", 0.5, 0.15)])
+def test_a_body_without_its_drive_coasts_as_far_as_its_friction_lets_it(make, v, far):
+    """``M v' = -b v - T``; the firmware's page prints these. The pendulum that hangs on it swings 2 % of that away."""
+    rig = make_rig(make)
+    p, arm = rig.plant, make == "furuta"
+    M = p.J_d + p.m_p * p.r**2 + p.J_a if arm else p.m_c + p.m_p
+    expected = M / p.b_1 * (v - p.b_1c / p.b_1 * math.log(1 + p.b_1 * v / p.b_1c))
+    x0 = p.state("hanging")
+    x0[1] = v
+    x = simulate(p, rig.drive, x0, np.zeros(2), 1e-3, samples=20_000, substeps=2)[:, 0, 0]
+    assert x.max() == pytest.approx(expected, rel=0.03)
+    assert expected == pytest.approx(far, rel=0.01)
 
 
 def started(pressed):

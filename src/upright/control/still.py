@@ -3,7 +3,7 @@
 The driven body stands still where its command is within friction, for as long as it likes; beyond `HELD_BY` times the
 friction that the model knows of, it moves. The pendulum on it stands still, to a count, only while what carries it is
 accelerated against what its lean makes of it: ``theta'' = psi''/rho + a_33 theta``, where hinges hold little and the
-lean is known to `OUT_OF_TRUE`. What else holds either is a hand.
+lean is known to `OUT_OF_TRUE`. What else holds either is a hand; and where nothing moves at all, nobody can tell.
 """
 
 from __future__ import annotations
@@ -19,6 +19,9 @@ UNSEEN, EXCESS, FOR = 40, 0.5, 0.1
 it at most takes it in so long [s], since a hand and friction of the day may be so much more."""
 SWUNG, LEAST_SWUNG = 0.02, 12
 """Nor a pendulum by such an angle [rad], and by so many counts."""
+STIRRED = 0.25
+"""Share of that angle by which what carries it must have left its line: where both stand still, friction holds the one
+and a hand that leans on it the other, however far it leans."""
 WITHIN = 0.3
 """And it must have swung within so long [s]: a hinge that sticks holds it while the body drifts slowly."""
 _SPEED = 60.0  # rad/s, corner behind which the body's speed is taken
@@ -78,4 +81,6 @@ class StillPendulum:
         self._for += self._period
         off = self._behind - self._from - self._speed * self._for
         falls = 0.5 * self._gravity * self._for**2
-        return abs(off / self._rho + falls * shown) - abs(falls) * OUT_OF_TRUE > self._least
+        carried = off / self._rho
+        left = abs(carried + falls * shown) - abs(falls) * OUT_OF_TRUE > self._least
+        return left and abs(carried) > STIRRED * self._least
