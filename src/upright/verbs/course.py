@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.renamed import WORN, renamed
@@ -44,6 +44,21 @@ class Laboratory:
     book: Book
     interrupted: bool
     hints: tuple[str, ...] = ()
+
+    def experiment(self, name: str) -> Answer[Any]:
+        """One experiment's numbers and report, by its name: ``lab.experiment("3").plot("track-steps")``.
+
+        Its `pictures` name what `plot` draws, its logs and studies are in the folder of its name.
+
+        Raises
+        ------
+        BadInput
+            When it was not run.
+        """
+        chapters = {c.key: c for c in self.book.chapters}
+        if name not in chapters:
+            raise BadInput(f"experiment '{name}' was not run; {nearest(name, chapters)}")
+        return Answer(chapters[name].numbers, chapters[name])
 
 
 def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
