@@ -176,7 +176,7 @@ def test_the_way_of_the_poles_of_least_cost_passes_through_those_chosen(weights)
     done = design_for(ARM, DesignRequest(at="inverted", weights=weights, period=2e-3, limit=10.0))
     assert done.R is not None
     pictures = {b.name: b for part in chapter(done).parts for b in part.content if hasattr(b, "draw")}
-    (ax,) = pictures["locus"].draw().axes
-    drawn = [complex(x, y) for line in ax.get_lines() for x, y in np.asarray(line.get_xydata()).tolist()]
+    (plane,) = pictures["locus"].draw().panels
+    drawn = [complex(*z) for line in plane.lines if not line.mark for z in zip(line.x, line.y, strict=True)]
     for pole in done.wanted[done.wanted.imag >= 0]:
         assert min(abs(z - pole) for z in drawn) < 0.05 * abs(pole)
