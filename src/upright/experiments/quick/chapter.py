@@ -55,7 +55,7 @@ def _sentence(clause: str) -> str:
 def _detail(result: QuickRun) -> str:
     if result.wiring.wrong:
         return " ".join(_sentence(f"{what}: {remedy}") for what, remedy in result.wiring.wrong)
-    if result.fit is None:
+    if result.law is None:
         return ""
     return f"Of {LANES} rigs that the fit allows, {result.share:.0%} were caught in simulation beforehand."
 
@@ -131,7 +131,7 @@ def _steps(result: QuickRun) -> tuple[Step, ...]:
 
 def _findings(result: QuickRun) -> tuple[KeyNumber, ...]:
     if result.ascent is None:
-        return (KeyNumber(what="wiring", value=result.refused),)
+        return (KeyNumber(what="wiring" if result.wiring.wrong else "no loop", value=result.refused),)
     return (KeyNumber(what="time at the rig", value=f"{result.seconds:.0f} s"),)
 
 
