@@ -35,7 +35,7 @@ APART = ("peers", "mutants")
 """Those that run when they are named, and never among all: what is asked there is not how fast we are."""
 PUBLISHED = (
     "first", "kept", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers",
-    "crash", "safety", "dying", "false_stops", "quick_lab", "soak", "jitter", "gym", "peers", "mutants",
+    "starts", "crash", "safety", "dying", "false_stops", "quick_lab", "soak", "jitter", "gym", "peers", "mutants",
 )  # fmt: skip
 SHARED = (
     "first", "kept", "strangers", "coverage", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "starts",
@@ -131,7 +131,8 @@ def main(arguments: list[str] | None = None) -> int:
         type=float,
         default=60.0,
         metavar="N",
-        help="CPU time of the quick tests for one change [s], default 60; the slow ones have twice as much",
+        help="CPU time of the quick tests for one change [s], default 60, the slow ones have twice as much; that of "
+        "the searches of each study in `starts`",
     )
     changes.add_argument(
         "--map",
@@ -161,7 +162,7 @@ def main(arguments: list[str] | None = None) -> int:
     missed, failed = 0, []
     options: dict[str, dict[str, Any]] = {
         "fit": {"full": asked.full},
-        "starts": {"starts": asked.starts},
+        "starts": {"starts": asked.starts, "seconds": asked.seconds},
         "mutants": {
             "sample": asked.sample, "seed": asked.seed, "within": asked.within, "folder": asked.map,
             "verdicts": asked.judged, "workers": asked.workers or 2, "slow": asked.slow,

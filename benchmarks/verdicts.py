@@ -141,23 +141,29 @@ def run(
 ) -> list[Line]:
     """Wrong yes and wrong no by question."""
     every: Told = []
+
+    def lines() -> list[Line]:
+        named = [_line(question, [one[1:] for one in every if one[0] == question]) for question in
+                 dict.fromkeys(question for question, *_ in every)]  # fmt: skip
+        table = [*named, _line("all of them", [one[1:] for one in every])]
+        if markdown is not None:  # what is done is kept, should somebody interrupt
+            publish(markdown, "verdicts", "Verdicts", __doc__, table)
+        return table
+
     for place, make in enumerate(MAKES[: 2 if quick else None]):
         each = 1 if quick else 120
         progress(f"{each} rigs like {make.plant}")
         done, _ = of_each(answered, cases(make, place, each), workers)
         every += [one for told in done for one in told]
+        lines()
     if os.environ.get("UPRIGHT_REAL_DATA"):
         from benchmarks.asked import studies
 
         for name in studies()[: 1 if quick else None]:
             progress(name)
             every += rehearsed(name)
-    lines = [_line(question, [one[1:] for one in every if one[0] == question]) for question in
-             dict.fromkeys(question for question, *_ in every)]  # fmt: skip
-    lines.append(_line("all of them", [one[1:] for one in every]))
-    if markdown is not None:
-        publish(markdown, "verdicts", "Verdicts", __doc__, lines)
-    return lines
+            lines()
+    return lines()
 
 
 def _line(question: str, told: list[tuple[str, bool]]) -> Line:

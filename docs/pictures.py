@@ -12,6 +12,8 @@ from typing import Any
 WIDTH = 720  # pixels of a picture on the page
 _SHARP = 1.25  # stored pixels to one on the page
 _COLOURS = 80
+LIVE = "<p><em>Run this cell: the rig moves here, and you can push it.</em></p>"
+"""What is stored of a page in which a rig moves, whose program is larger than a notebook may be."""
 _COLUMN = 7.4  # inches, as wide as figures are drawn
 
 
@@ -25,6 +27,10 @@ def load_ipython_extension(shell: Any) -> None:
     formatters["text/plain"].for_type(
         Figure, lambda drawing, printer, _: printer.text(description(drawing))
     )
+    for moving in ("Played", "PlayedRun"):
+        formatters["text/html"].for_type_by_name(
+            "upright.verbs.control.moving", moving, lambda _: LIVE
+        )
 
 
 def _png(drawing: Any) -> tuple[bytes, dict[str, Any]]:

@@ -136,6 +136,22 @@ def test_place_takes_every_kind_of_model_and_moves_its_poles(given):
         assert gains.states == ("psi", "psi_dot", "theta", "theta_dot")
 
 
+@pytest.mark.parametrize("period", [None, "2 ms"])
+def test_python_control_takes_a_model_unpacked_or_converted(period):
+    """Its poles and its answer at a frequency are ours; `control.ss(model)` is refused by python-control itself."""
+    model = up.Furuta(**FURUTA).linear("inverted")
+    if period is not None:
+        model = up.hold(model, period)
+    for theirs in (control.ss(*model), model.to_control()):
+        assert np.sort_complex(theirs.poles()) == pytest.approx(np.sort_complex(model.poles()), abs=1e-9)
+        at = 1j * 5.0 if model.dt is None else np.exp(5j * model.dt)
+        by_hand = model.C @ np.linalg.solve(at * np.eye(4) - model.A, model.B) + model.D
+        np.testing.assert_allclose(theirs(at), by_hand, rtol=1e-9)
+        assert theirs.dt == (model.dt or 0)
+    assert "control.ss(*model)" in up.StateSpace.__doc__
+    assert "to_control" in up.StateSpace.__doc__
+
+
 def test_least_cost_agrees_with_python_control():
     control = pytest.importorskip("control")
     model = up.Furuta(**FURUTA).linear("inverted")

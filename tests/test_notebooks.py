@@ -98,6 +98,12 @@ def test_a_notebook_imports_nothing_of_the_checkout():
         assert not imported, path.name
 
 
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_a_notebook_uses_public_names_alone_and_shows_a_rig_that_moves(path):
+    assert re.findall(r"^ *(?:from|import) upright.*", sources(path), re.M) == ["import upright as up"]
+    assert re.search(r"\.play\(", sources(path))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("right", "wrong"),

@@ -38,7 +38,12 @@ def test_a_twin_is_told_and_its_fit_foretells_the_same(tmp_path):
     first = track("--seed", 3, "--set", "1,4", "-o", tmp_path / "out")
     assert first.exit_code == 0, first.stderr
     told = " ".join(first.stdout.split())
-    for words in ("What the pulses say", "static force per error [N/m]", "Verdict: A step of", "What next"):
+    for words in (
+        "Estimates from the pulses",
+        "static force per error [N/m]",
+        "Verdict: All 2 pole sets follow a step of",
+        "What next",
+    ):
         assert words in told
     page = (tmp_path / "out" / "track.html").read_text(encoding="utf-8")
     for name in ("track-poles", "track-steps", "track-compared", "track-bargain", "track-loci"):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from upright.control import Trial, design_swing_up
+from upright.control import Trial, design_swing_up, trial
 from upright.control.swing_up import (
     AWAY,
     FADE,
@@ -26,7 +26,6 @@ from upright.control.swing_up import (
     ascent_of,
     body,
     swing_and_hold,
-    swing_up,
 )
 from upright.errors import BadInput, RigStopped
 from upright.records import Record
@@ -51,6 +50,13 @@ def law(request):
 def frictionless(make):
     plant = make_rig(make).plant
     return replace(make_rig(make), plant=plant.replace(**{n: 0.0 for n in plant.names() if n.startswith("b_")}))
+
+
+def swing_up(rig, law, *, seconds, pushes=None):
+    """What the law comes to on a rig that hangs at rest."""
+    plant = rig.plant
+    rule, start = law.rule(rig, plant.state("hanging")), plant.state("hanging") - plant.state("inverted")
+    return ascent_of(trial(rig, rule, at="inverted", start=start, seconds=seconds, pushes=pushes), law, rule)
 
 
 def crane(rig):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.readers.ecp import read, recognise
+from upright.readers.ecp import READER, read
 from upright.readers.source import Source
 
 HEAD = " Sample   Time     Commanded Pos   Encoder 1 Pos   Control Effort"
@@ -26,7 +26,7 @@ def source(text: str) -> Source:
     ],
 )  # fmt: skip
 def test_an_export_is_known_by_its_names_or_its_bracket(text, ecp):
-    assert recognise(source(text)) is ecp
+    assert READER.recognises(source(text)) is ecp
 
 
 ROWS = ["[ 0 0.000 0 5 0.5000;", "  1 0.009 3 6 0.2500;", "  2 0.018 6 7 0.1250]"]

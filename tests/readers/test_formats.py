@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from tests.readers import logs
 from upright.errors import BadInput
-from upright.readers import read, read_source, recognise
+from upright.readers import read, read_source, reader_of
 from upright.readers.resolution import rebuild
 from upright.readers.source import Source
 from upright.records import Record
@@ -37,7 +37,7 @@ def source(data: bytes, name: str = "log.csv") -> Source:
     ],
 )
 def test_the_format_is_told_by_the_content_not_by_the_suffix(name: str, reader: str) -> None:
-    assert recognise(source(logs.SYNTHETIC[name](), "renamed.dat")) == reader
+    assert reader_of(source(logs.SYNTHETIC[name](), "renamed.dat")) == reader
 
 
 @pytest.mark.parametrize("newline", ["\r\n", "\n"])

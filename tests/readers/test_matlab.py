@@ -16,7 +16,7 @@ from scipy.io import savemat
 from tests.readers.test_damage import element, matlab, start
 from upright.errors import BadInput
 from upright.readers import read_source
-from upright.readers.matlab import recognise, variables
+from upright.readers.matlab import READER, variables
 from upright.readers.source import Source
 from upright.records import Record
 
@@ -69,7 +69,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
     ],
 )
 def test_a_matlab_file_is_known_by_its_beginning_or_by_its_suffix_and_a_zero_byte(name, data, recognised):
-    assert recognise(source(data, name)) is recognised
+    assert READER.recognises(source(data, name)) is recognised
 
 
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}

@@ -7,7 +7,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.readers import read_source
-from upright.readers.rosbag import recognise
+from upright.readers.rosbag import READER
 from upright.readers.source import Source
 from upright.records import Record
 
@@ -34,7 +34,7 @@ def refusal(*lines: str) -> str:
     ],
 )  # fmt: skip
 def test_a_bag_has_a_receive_time_or_a_stamp(line, bag):
-    assert recognise(source(line, "1,2")) is bag
+    assert READER.recognises(source(line, "1,2")) is bag
 
 
 HEAD = "__time,/j/header/stamp,/j/a,/cmd/u,/mode/m"

@@ -77,10 +77,10 @@ def design_page(**wish):
 
 def paper_page(folder: Path) -> Chapter:
     from upright.paper.chapter import chapter
-    from upright.paper.reproduce import reproduce
+    from upright.paper.reproduce import reproduce_tables
     from upright.rig.makes import NOMINAL
 
-    return chapter(reproduce(NOMINAL, seed=1))
+    return chapter(reproduce_tables(NOMINAL, seed=1))
 
 
 def ladder_page(folder: Path) -> Chapter:

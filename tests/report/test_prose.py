@@ -95,6 +95,16 @@ def test_a_bar_and_a_blank_line_in_a_value_part_nothing(module):
     assert page.parts[0].content[0].rows == (("|x| ## no part",),)
 
 
+def test_an_expression_that_prints_nothing_parts_no_paragraph(module):
+    text = (
+        "# T{{ '' }}\n\nOne\n{{ 'never' if not yes }}\n{{ '' }}\ntwo.\n\n## P{{ '' }}\n\n"
+        "| a | b |\n|---|---|\n{{ '' }}\n| 1 | {{ '' }} |\n"
+    )
+    page = chapter_of(module(text, "prose_nothing"), yes=True)
+    assert (page.title, page.verdict, page.detail) == ("T", "One two.", "")
+    assert (page.parts[0].title, page.parts[0].content[0].rows) == ("P", (("1", ""),))
+
+
 @pytest.mark.parametrize(
     ("text", "error", "words"),
     [

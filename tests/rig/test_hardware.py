@@ -143,7 +143,7 @@ def test_a_rig_is_called_as_its_study_or_all_its_logs_call_it(text, logs, name):
 
 
 def test_a_vendor_has_a_data_sheet_or_is_none():
-    assert check_vendor("") == ""
+    assert check_vendor(None) is None
     assert check_vendor("ECP 205") == "ECP 205"
     with pytest.raises(BadInput, match="there is no data sheet of 'ECP 206'; did you mean"):
         check_vendor("ECP 206")

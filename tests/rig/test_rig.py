@@ -52,6 +52,8 @@ def test_what_nobody_said_is_asked_for_where_it_is_needed(name, meaning):
 
 def test_what_nobody_said_is_none_where_a_rig_can_be_without():
     rig = Rig(plant=ARM)
+    assert (rig.name, rig.unit) == ("furuta", "N m")  # it is its plant, and its command the plant's moment
+    assert (rig.hardware.name, rig.hardware.vendor) == (None, None)
     assert (rig.delay, rig.lag, rig.offset, rig.converter) == (0, 0, 0, 0)
     assert (rig.travel, rig.speed_limit, rig.twist, rig.saturation) == (math.inf,) * 4
     assert rig.replace(travel=1.0).replace(travel=math.inf) == rig

@@ -63,7 +63,7 @@ def study(tmp_path):
 
 def test_every_entry_tells_its_value_and_its_source(study):
     said = load_study(study()).hardware
-    assert (said.name, said.vendor) == ("bench 3", "")
+    assert (said.name, said.vendor) == ("bench 3", None)
     told = {n: (e.value, e.unit, e.source) for n, e in said.entries.items()}
     assert told["servo_period"] == (pytest.approx(0.002), "s", "known")
     assert told["counts.theta"] == (pytest.approx(4096), "1/rev", "measured")

@@ -123,8 +123,18 @@ def test_gains_act_on_what_the_encoder_shows(counts, step):
 
 
 def test_counts_of_an_angle_are_per_turn():
-    run = up.simulate(PENDULUM, [1.0, 0.0], start=[0.26, 0.0], seconds=0.01, counts=100)
+    run = up.simulate(PENDULUM, [1.0, 0.0], at="hanging", start=[0.26, 0.0], seconds=0.01, counts=100)
     assert run["T"][0] == pytest.approx(-4 * 2 * math.pi / 100)  # 0.2513 is the nearest
+
+
+def test_bare_gains_hold_about_the_equilibrium_that_is_named_and_about_none_that_is_not():
+    """Eq. (3): gains for the inverted pendulum closed about hanging regulate nothing, and it stays there unnoticed."""
+    gains = up.place(PENDULUM.linear("inverted"), [-8.0, -9.0])
+    with pytest.raises(up.BadInput, match=r'about which equilibrium they hold; say at="hanging" or at="inverted"'):
+        up.simulate(PENDULUM, gains.K, start=[0.05, 0.0])
+    run = up.simulate(PENDULUM, gains.K, at="inverted", start=[0.05, 0.0], seconds=3.0)
+    assert run["theta"][-1] == pytest.approx(math.pi, abs=1e-3)
+    assert up.simulate(PENDULUM, gains, start=[0.05, 0.0], seconds=3.0)["theta"] == pytest.approx(run["theta"])
 
 
 def test_the_low_pass_on_differences_remembers_its_share():

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.control.braking import Braking
-from upright.control.trial import SUBSTEPS, Trial, readings, trial
+from upright.control.trial import SUBSTEPS, Trial, readings
 from upright.errors import BadInput
 from upright.gains import filtered, place_sampled
 from upright.gains.requests import poles_of
@@ -448,33 +448,6 @@ class Ascent:
     def _changes(self, before: float, after: float) -> tuple[float, ...]:
         at = np.flatnonzero((self.mode[:-1] == before) & (self.mode[1:] == after)) + 1
         return tuple(self.trial.t[at].tolist())
-
-
-def swing_up(
-    rig: Rig,
-    law: SwingUp,
-    *,
-    seconds: float = 10.0,
-    start: ArrayLike | None = None,
-    pushes: ArrayLike | None = None,
-) -> Ascent:
-    """Let a law swing a rig's pendulum up from where it hangs.
-
-    Parameters
-    ----------
-    rig : Rig
-        As it truly is.
-    start : array, shape (states,), optional
-        Where the rig is when the law is switched on; at rest, hanging, when omitted.
-    pushes : array, shape (T,), optional
-        What disturbs the drive, added to the command before its limit.
-    """
-    x0 = rig.plant.state("hanging") if start is None else np.asarray(start, dtype=np.float64)
-    rule = law.rule(rig, x0)
-    run = trial(
-        rig, rule, at="inverted", start=x0 - rig.plant.state("inverted"), seconds=seconds, pushes=pushes
-    )  # fmt: skip
-    return ascent_of(run, law, rule)
 
 
 def ascent_of(run: Trial, law: SwingUp, rule: Rule) -> Ascent:

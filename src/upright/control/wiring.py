@@ -66,15 +66,15 @@ class WiringCheck:
         Whether they are per turn.
     scale, error : tuple of float
         What each encoder shows over what is true, without its sign, and standard errors.
-    drive, drive_error : float
+    drive, drive_error : float or None
         Force of a unit of command over what is described, without its sign.
-    dead_zone, dead_error : float
+    dead_zone, dead_error : float or None
         Command that is lost to either side [command unit].
-    delay : float
+    delay : float or None
         From a command to its force [s].
-    moves, swings : float
+    moves, swings : float or None
         Sign of the body's shown motion under a positive command, and of the pendulum's shown motion under that of the
-        body, each over what the model has; 0 where nothing was shown.
+        body, each over what the model has; None where nothing was shown.
     broke_away : tuple of float
         Commands to either side at which the body had moved [command unit].
     """
@@ -83,15 +83,15 @@ class WiringCheck:
     unit: str
     described: tuple[float, float]
     turns: tuple[bool, bool]
-    moves: float = 0.0
-    swings: float = 0.0
+    moves: float | None = None
+    swings: float | None = None
     scale: tuple[float, float] = (1.0, 1.0)
     error: tuple[float, float] = (0.0, 0.0)
-    drive: float = 1.0
-    drive_error: float = 0.0
-    dead_zone: float = 0.0
-    dead_error: float = 0.0
-    delay: float = 0.0
+    drive: float | None = None
+    drive_error: float | None = None
+    dead_zone: float | None = None
+    dead_error: float | None = None
+    delay: float | None = None
     broke_away: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -102,7 +102,7 @@ class WiringCheck:
     @property
     def weak(self) -> str:
         """That the drive gives less than described, as a clause; a loop made from what it gives may be closed."""
-        if not self.drive + SURE * self.drive_error < WEAK:
+        if self.drive is None or self.drive_error is None or not self.drive + SURE * self.drive_error < WEAK:
             return ""
         share = "half" if abs(self.drive - 0.5) < 0.1 else f"{self.drive:.2g} of what is described"
         return f"supply at {share}: the drive gives {self.drive:.2g} ± {2 * self.drive_error:.1g} times its description"
@@ -110,7 +110,7 @@ class WiringCheck:
     @property
     def _turned(self) -> tuple[tuple[str, str], ...]:
         driven, pendulum = self.names
-        if self.moves == 0.0 or self.swings == 0.0:
+        if self.moves is None or self.swings is None:
             return (self._dead,)
         turned = {
             (1.0, 1.0): (), (-1.0, 1.0): (("motor leads swapped", "change the motor's two leads over"),),
@@ -122,9 +122,9 @@ class WiringCheck:
     @property
     def _dead(self) -> tuple[str, str]:
         driven, pendulum = self.names
-        if self.moves == 0.0 and self.swings == 0.0:
+        if self.moves is None and self.swings is None:
             return "nothing moves", "look at supply, enable line and motor leads; is something holding it fast?"
-        dead = driven if self.moves == 0.0 else pendulum
+        dead = driven if self.moves is None else pendulum
         return f"encoder of {dead} shows nothing", "look at its supply, its cable and its two channels"
 
     @property
@@ -168,12 +168,12 @@ def check_wiring(model: Rig, t: ArrayLike, readings: ArrayLike, command: ArrayLi
     )  # fmt: skip
     shows = [bool(np.ptp(column) > PLAIN * step) for column, step in zip(shown.T, model.resolution, strict=True)]
     if not all(shows):
-        return replace(known, moves=float(shows[0]), swings=float(shows[1]))
+        return replace(known, moves=1.0 if shows[0] else None, swings=1.0 if shows[1] else None)
     b, every = body(model), max(1, round(APART / dt))
     motion = _Motion(shown[:, 0], shown[:, 1], dt, every)
     scale, error, signed = _scales(b, motion)
     turned = replace(known, scale=scale, error=error, swings=math.copysign(1.0, signed))
-    return _of_drive(model, b, turned, motion, u, dt)
+    return _of_drive(model, b, turned, signed, motion, u, dt)
 
 
 class _Motion:
@@ -241,9 +241,9 @@ def _scales(b: Body, m: _Motion) -> tuple[tuple[float, float], tuple[float, floa
     return (s, c), (of_s, c * math.sqrt(max(spread[0, 0], 0.0))), float(x[1] / x[2])
 
 
-def _of_drive(model: Rig, b: Body, check: WiringCheck, m: _Motion, u: Array, dt: float) -> WiringCheck:
+def _of_drive(model: Rig, b: Body, check: WiringCheck, signed: float, m: _Motion, u: Array, dt: float) -> WiringCheck:
     """What the drive gives, by the row of the body: inertia, friction, gain and dead zone."""
-    s, c = check.scale[0], check.scale[1] * check.swings
+    s, c = check.scale[0], math.copysign(check.scale[1], signed)
     q1, q2, theta, w, w2 = m.p1 / s, m.p2 / s, m.h / c, m.h1 / c, m.h2 / c
     sine, cosine = np.sin(theta), np.cos(theta)
     # with the pendulum's share known, inertia and what a unit of command gives follow beside each other

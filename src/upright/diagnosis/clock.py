@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from upright.diagnosis.case import Case
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.errors import BadInput
-from upright.readers import read_source, recognise
+from upright.readers import read_source, reader_of
 from upright.readers.delimited import layout
 from upright.readers.source import Source, load
 from upright.records import Array, PathLike, Record
@@ -168,7 +168,7 @@ def read_mended(path: PathLike, *, reader: str = "") -> tuple[Record, tuple[Find
     try:
         return read_source(source, reader=reader or None), ()
     except BadInput as error:
-        if "time must increase" not in str(error) or (reader or recognise(source)) != "table":
+        if "time must increase" not in str(error) or (reader or reader_of(source)) != "table":
             raise
     text = layout(source)
     table = text.numbers()

@@ -258,7 +258,7 @@ class Reproduced:
         return f"All {count} poles of Tables 1 and 2 come again, {how}; {shown} of 6 errata are shown."
 
 
-def reproduce(furuta: Furuta, seed: int = 0) -> Reproduced:
+def reproduce_tables(furuta: Furuta, seed: int = 0) -> Reproduced:
     """Tables 1 and 2 again, and the errata: `furuta` gets gains by eq. (2) as printed, `seed` draws rigs to try on."""
     first = _again("Table 1: Furuta pendulum, inverted", TABLE_1, free=(2,))
     second = _again("Table 2: two carts, ECP 210", TABLE_2, free=(3, 2, 1))

@@ -13,7 +13,7 @@ from upright.readers.reader import READERS, Reader
 from upright.readers.source import Source, load
 from upright.records import PathLike, Record
 
-__all__ = ["READERS", "inspect", "read", "recognise"]
+__all__ = ["READERS", "inspect", "read", "reader_of"]
 
 
 def read(path: PathLike, *, reader: str | None = None) -> Record:
@@ -36,7 +36,7 @@ def read(path: PathLike, *, reader: str | None = None) -> Record:
 
 def read_source(source: Source, *, reader: str | None = None) -> Record:
     """Record of content already in memory; see `read`."""
-    chosen = READERS.named(reader or recognise(source))
+    chosen = READERS.named(reader or reader_of(source))
     try:
         return chosen.read(source)
     except BadInput as error:
@@ -44,7 +44,7 @@ def read_source(source: Source, *, reader: str | None = None) -> Record:
         raise BadInput(" ".join((f"{where}{error}", *(() if reader else READERS.unsound())))) from None
 
 
-def recognise(source: Source) -> str:
+def reader_of(source: Source) -> str:
     """Name of the reader for this content, the first in the readers' `order` that recognises it."""
     readers = sorted(READERS.sound().items(), key=lambda item: item[1].order)
     return next(name for name, reader in readers if _recognises(name, reader, source))

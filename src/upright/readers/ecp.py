@@ -15,7 +15,7 @@ from upright.readers.source import Source, TextTable
 from upright.records import Record
 
 
-def recognise(source: Source) -> bool:
+def _recognises(source: Source) -> bool:
     """Whether text begins like an ECP export: names, then a bracket within the first lines."""
     head = source.text[:4000].split("\n")
     names = next((line for line in head if line.strip()), "")
@@ -72,4 +72,4 @@ def _unwrapped(source: Source, lines: list[str], first: int, last: int) -> str:
     return "\n".join(rows)
 
 
-READER = Reader(name="ecp", files="ECP exports", recognises=recognise, read=read, order=40)
+READER = Reader(name="ecp", files="ECP exports", recognises=_recognises, read=read, order=40)

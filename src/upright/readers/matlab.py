@@ -58,7 +58,7 @@ class Unreadable:
     kind: str
 
 
-def recognise(source: Source) -> bool:
+def _recognises(source: Source) -> bool:
     """Whether content is a MATLAB file of any version, or claims to be one by its suffix."""
     data, claimed = source.data, source.file.casefold().endswith(".mat")
     return data[:6] == b"MATLAB" or _is_hdf5(data) or (claimed and b"\0" in data[:128])
@@ -437,4 +437,4 @@ def _shape(value: Any) -> str:
     return f"{len(value)} cells" if isinstance(value, list) else "structure" if isinstance(value, dict) else "text"
 
 
-READER = Reader(name="matlab", files="MATLAB version 5", recognises=recognise, read=read, order=20)
+READER = Reader(name="matlab", files="MATLAB version 5", recognises=_recognises, read=read, order=20)

@@ -32,7 +32,7 @@ class Topic:
     rows: NDArray[np.intp]  # where it wrote
 
 
-def recognise(source: Source) -> bool:
+def _recognises(source: Source) -> bool:
     """Whether names above the rows look like a bag's: a receive time, or slashes and a stamp."""
     names = [name.strip() for name in source.text[:_HEAD].lstrip().split("\n", 1)[0].split(",")]
     bag = RECEIVED in names or any(name.endswith(STAMP) for name in names)
@@ -199,4 +199,4 @@ def _moves_before(t: Array, signals: dict[str, Array], units: dict[str, str], he
     return notes
 
 
-READER = Reader(name="ros-bag", files="ROS bags as CSV", recognises=recognise, read=read, order=60)
+READER = Reader(name="ros-bag", files="ROS bags as CSV", recognises=_recognises, read=read, order=60)

@@ -9,7 +9,7 @@ from upright.readers.source import Source
 from upright.records import Record
 
 
-def recognise(source: Source) -> bool:
+def _recognises(source: Source) -> bool:
     """Whether content begins as MCAP does."""
     return source.data.startswith(MAGIC)
 
@@ -19,4 +19,4 @@ def read(source: Source) -> Record:
     return log_of(source.data, source.file).record(source.provenance("mcap"))
 
 
-READER = Reader(name="mcap", files="logs of a run (MCAP)", recognises=recognise, read=read, order=10)
+READER = Reader(name="mcap", files="logs of a run (MCAP)", recognises=_recognises, read=read, order=10)

@@ -94,11 +94,11 @@ def _rendered(template: str, **values: Any) -> str:
 
     return rendered(
         "upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__,
-        mark=mark, breadth=breadth, sentences=sentences, brief=brief, scale=scale, evidence=evidence,
+        tone=tone, breadth=breadth, brief=brief, scale=shared_scale, evidence=evidence,
     )  # fmt: skip
 
 
-def mark(state: str) -> str:
+def tone(state: str) -> str:
     """Class of a badge by its word: ``ok``, ``care``, ``no`` or ``none``."""
     word = state.split(" (")[0].split(",")[0]
     return next((name for name, words in _MARKS.items() if word in words.split("|")), "care")
@@ -113,25 +113,25 @@ def breadth(table: Table) -> str:
     return next((name for name, most in _BREADTHS if letters <= most), "vast")
 
 
-def sentences(text: str) -> list[str]:
+def split_sentences(text: str) -> list[str]:
     """A text sentence by sentence."""
     return _SENTENCE.split(text) if text else []
 
 
 def brief(chapter: Chapter) -> tuple[str, str, str, str]:
     """Headline, the rest of the verdict, what of its detail is shown at once, and what is folded."""
-    headline, *rest = sentences(chapter.verdict) or [chapter.title]
+    headline, *rest = split_sentences(chapter.verdict) or [chapter.title]
     words = len(f"{chapter.title} {chapter.question} {chapter.verdict} {chapter.first_line}".split())
     words += sum(len(f"{a.question} {a.state} {a.why}".split()) for a in chapter.assessments)
     shown: list[str] = []
     assessed = " ".join(a.why for a in chapter.assessments)
-    more = [s for s in sentences(chapter.detail) if s not in assessed]
+    more = [s for s in split_sentences(chapter.detail) if s not in assessed]
     while more and (words := words + len(more[0].split())) <= WORDS_OF_A_VERDICT:
         shown.append(more.pop(0))
     return headline, " ".join(rest), " ".join(shown), " ".join(more)
 
 
-def scale(numbers: Sequence[KeyNumber]) -> int:
+def shared_scale(numbers: Sequence[KeyNumber]) -> int:
     """Half a scale [%] that the intervals of several numbers share, so that widths compare; a fifth may leave it."""
     halves = sorted(100 * n.half for n in numbers if n.half is not None and math.isfinite(n.half))
     most = halves[-1 - len(halves) // 5] if halves else 0.0

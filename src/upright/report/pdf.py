@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from upright.errors import BadInput
 from upright.files import replace_file
-from upright.report.html import mark
+from upright.report.html import tone
 from upright.report.page import Assessment, Book, Chapter, Formula, Picture, Symbol, as_plain
 from upright.report.symbols import symbol
 
@@ -57,7 +57,7 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
             name, rest = value.divided()
             return [_tree(ElementTree.fromstring(symbol(name))), rest]
         if isinstance(value, Assessment):
-            return {**vars(value), "tone": mark(value.state)}
+            return {**vars(value), "tone": tone(value.state)}
         return None
 
     content: dict[str, Any] = {"version": __version__, **as_plain(page, instead)}
@@ -65,7 +65,7 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
         content["cover"] = as_plain(page.cover, instead)
         content["headline"] = page.headline
         plain: list[dict[str, Any]] = content["chapters"]
-        states = [{"state": c.state, "tone": mark(c.state)} for c in page.chapters]
+        states = [{"state": c.state, "tone": tone(c.state)} for c in page.chapters]
         content["chapters"] = [p | s for p, s in zip(plain, states, strict=True)]
     files["page.json"] = json.dumps(content, ensure_ascii=False).encode()
     files["main.typ"] = (Path(__file__).parent / "templates" / "report.typ").read_bytes()

@@ -49,6 +49,8 @@ from upright.report.symbols import number, percent, plain, typed, unit
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+_NOTHING = "\0"
+"""Printed where an expression comes to nothing, so that a line of it alone parts no paragraph."""
 _PARAGRAPH = re.compile(r"\n\s*\n")
 _BLANK = re.compile(r"[ \n]+")
 _SYMBOL = re.compile(r"\*([^*]+)\*(.*)", re.S)
@@ -101,6 +103,7 @@ def chapter_of(
     parts, steps = list[Part](), tuple[Step, ...]()
     for section in sections:
         heading, _, body = section.partition("\n")
+        heading = heading.replace(_NOTHING, "")
         if heading.strip() == "Next":
             steps = tuple(_step(s) for p in _paragraphs(body) for s in _items(p))
         elif named := _PLACED.fullmatch(heading.strip()):
@@ -144,8 +147,8 @@ def _cell(value: Any) -> Any:
         name, rest = value.divided()
         return f"*{name}*{rest}"
     if isinstance(value, str) and not isinstance(value, Markup):
-        return _BLANK.sub(" ", value.replace("|", r"\|"))
-    return value
+        value = _BLANK.sub(" ", value.replace("|", r"\|"))
+    return value if str(value) else _NOTHING
 
 
 def _line(text: str) -> str:
@@ -154,7 +157,8 @@ def _line(text: str) -> str:
 
 
 def _paragraphs(text: str) -> list[str]:
-    return [p.strip() for p in _PARAGRAPH.split(text) if p.strip()]
+    paragraphs = (p.replace(_NOTHING, "").strip() for p in _PARAGRAPH.split(text))
+    return [p for p in paragraphs if p]
 
 
 def _items(text: str) -> list[str]:
@@ -196,7 +200,7 @@ def _block(text: str, figures: Mapping[str, Callable[[], Any]]) -> Block:
 
 def _table(text: str) -> Table:
     rows, _, caption = text.partition("\n: ")
-    headings, rule, *cells = (_cells(row) for row in rows.splitlines())
+    headings, rule, *cells = (_cells(row) for row in rows.splitlines() if row.strip())
     for row in cells:
         if len(row) != len(headings):
             raise ValueError(f"a row of {len(row)} cells in a table of {len(headings)} columns: {' | '.join(row)}")

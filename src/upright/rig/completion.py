@@ -16,7 +16,7 @@ from upright.rig.rig import Rig
 
 
 def completed(
-    rig: Rig, entries: Mapping[str, Entry | None] | None = None, *, vendor: str = "",
+    rig: Rig, entries: Mapping[str, Entry | None] | None = None, *, vendor: str | None = None,
     needs: Collection[str] = ("limit", "servo_period", "counts"), who: str = "a simulation", form: str = "--{} {}",
 ) -> Rig:  # fmt: skip
     """A rig with what is known of its drive, encoders and servo: what a call gives, its own, the data sheet named.

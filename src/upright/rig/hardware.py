@@ -46,18 +46,18 @@ class Hardware:
 
     Attributes
     ----------
-    name : str
-        As its owner, or its logs, call it; may be empty.
-    vendor : str
-        One of `VENDORS` whose data sheet gives what is left out here; empty for a rig of one's own.
+    name : str, optional
+        As its owner, or its logs, call it.
+    vendor : str, optional
+        One of `VENDORS` whose data sheet gives what is left out here.
     entries : mapping of str to Entry
         ``"limit"``, ``"lag"`` and so on as under [actuator]; ``"drive_sign"``; ``"converter"``; ``"servo_period"``,
         ``"travel"``, ``"speed_limit"``, ``"twist"``; and by coordinate ``"counts.theta"`` (per turn or metre),
         ``"sign.theta"`` and ``"offset.theta"``.
     """
 
-    name: str = ""
-    vendor: str = ""
+    name: str | None = None
+    vendor: str | None = None
     entries: Mapping[str, Entry] = field(default_factory=dict[str, Entry])
 
     def over(self, base: Mapping[str, Entry]) -> Hardware:
@@ -156,17 +156,22 @@ def place_of(name: str) -> str:
     return f'[actuator] {kind} = "..."'
 
 
-def check_vendor(name: str) -> str:
-    """Name of a vendor's rig as it came, "" included.
+def check_vendor(name: str | None) -> str | None:
+    """Name of a vendor's rig as it came, None included.
 
     Raises
     ------
     BadInput
         When no data sheet of it is known.
     """
-    if name and name not in VENDORS:
+    if name is not None and name not in VENDORS:
         raise BadInput(f"there is no data sheet of '{name}'; {nearest(name, VENDORS)} (known are {', '.join(VENDORS)})")
     return name
+
+
+def force_unit(kind: type[Plant]) -> str:
+    """Unit of the plant's input, "" without one."""
+    return kind.inputs[0].unit if kind.inputs else ""
 
 
 def driven_unit(plant: type[Plant]) -> str:

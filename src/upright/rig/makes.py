@@ -232,10 +232,10 @@ NOMINAL = cast("Furuta", MAKES["furuta"].rig.plant).replace(b_1=6e-4, b_1c=1.5e-
 """The Furuta pendulum as designed, its drive belt off."""
 
 
-def make_named(key: str, *, option: str = "--rig") -> Make:
+def make_named(key: str | None, *, option: str = "--rig") -> Make:
     """Make that an option of the command line names; `BadInput` where there is none."""
-    if key not in MAKES:
-        raise BadInput(f"{option} is one of {', '.join(MAKES)}, got '{key}'; {nearest(key, MAKES)}")
+    if key is None or key not in MAKES:
+        raise BadInput(f"{option} is one of {', '.join(MAKES)}, got '{key}'; {nearest(key or '', MAKES)}")
     return MAKES[key]
 
 
@@ -262,7 +262,7 @@ def make_of_rig(rig: Rig) -> Make:
     )
 
 
-def make_of_vendor(vendor: str, plant: Plant) -> Make | None:
+def make_of_vendor(vendor: str | None, plant: Plant) -> Make | None:
     """Make of a vendor that has this plant, None where he has none, or none was named."""
     return next((m for m in MAKES.values() if m.vendor == vendor and type(m.rig.plant) is type(plant)), None)
 

@@ -17,7 +17,7 @@ from upright.physics.actuator import ACTUATOR
 from upright.records import Array
 from upright.renamed import former
 from upright.rig.drive import GAIN, MORE, driven, saturation
-from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, meaning_of, place_of, turn_of
+from upright.rig.hardware import Entry, Hardware, counts_unit, driven_unit, force_unit, meaning_of, place_of, turn_of
 from upright.rig.mounting import Mounting
 from upright.shown import Shown
 from upright.systems import StateSpace
@@ -39,12 +39,12 @@ class Rig(Shown):
     Attributes
     ----------
     plant : Plant
-    name : str
-        As its owner, its make or its plant is called.
+    name : str, optional
+        As its owner or its make calls it; as its plant is called when omitted.
     gain : float
         Force per unit of command.
-    unit : str
-        Of the command.
+    unit : str, optional
+        Of the command; that of the plant's force when omitted.
     hardware : Hardware
         Drive, encoders, servo and travel, each number with its source.
     sources : mapping of str to str
@@ -64,9 +64,9 @@ class Rig(Shown):
     """
 
     plant: Plant
-    name: str = ""
+    name: str = None  # type: ignore[assignment] # filled in below
     gain: float = 1.0
-    unit: str = ""
+    unit: str = None  # type: ignore[assignment]
     hardware: Hardware = field(default_factory=Hardware)
     sources: Mapping[str, str] = field(default_factory=dict[str, str])
     draws: tuple[tuple[Plant, float], ...] = ()
@@ -76,13 +76,18 @@ class Rig(Shown):
     basis: Basis = DESCRIBED
 
     def __post_init__(self) -> None:
+        kind = type(self.plant)
+        if self.name is None:  # type: ignore[reportUnnecessaryComparison]
+            object.__setattr__(self, "name", name_of(kind) or kind.__name__)
+        if self.unit is None:  # type: ignore[reportUnnecessaryComparison]
+            object.__setattr__(self, "unit", force_unit(kind))
         if self.scales and len(self.scales) != len(self.plant.coordinates):
             n = len(self.plant.coordinates)
             raise BadInput(f"a rig with {n} coordinates needs {n} scales of its encoders, got {self.scales}.")
 
     @classmethod
     def known(
-        cls, plant: Plant, *, name: str = "", gain: float | str = 1.0, unit: str = "V", **numbers: Any
+        cls, plant: Plant, *, name: str | None = None, gain: float | str = 1.0, unit: str = "V", **numbers: Any
     ) -> Rig:  # fmt: skip
         """A rig whose numbers are known.
 
@@ -112,10 +117,8 @@ class Rig(Shown):
         """
         if not isinstance(plant, Plant):  # type: ignore[reportUnnecessaryIsInstance]
             raise BadInput(f"a rig has a plant with numbers, such as up.Pendulum(m_p=...), got {plant!r:.40}.")
-        force = plant.inputs[0].unit if plant.inputs else ""
-        strength = in_unit(gain, f"({force})/({unit})")
-        called = name or name_of(type(plant)) or type(plant).__name__
-        return cls(plant=plant, name=called, gain=strength, unit=unit).replace(**numbers)
+        strength = in_unit(gain, f"({force_unit(type(plant))})/({unit})")
+        return cls(plant=plant, name=name, gain=strength, unit=unit).replace(**numbers)  # type: ignore[arg-type]
 
     def replace(self, **changes: Any) -> Rig:
         """The same rig with something else in it.

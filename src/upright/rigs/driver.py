@@ -22,7 +22,7 @@ class Connection:
     Attributes
     ----------
     kind, name : str
-        As RIG.toml calls driver and rig; the name may be empty.
+        As RIG.toml calls driver and rig.
     zero : str
         Equilibrium at which the encoders are zeroed.
     board : mapping of str to any
@@ -36,10 +36,10 @@ class Connection:
     kind: str
     model: Rig
     truth: Rig
-    name: str = ""
-    port: str = ""
+    name: str | None = None
+    port: str | None = None
     record: Path | None = None
-    zero: str = ""
+    zero: str | None = None
     board: Mapping[str, Any] = field(default_factory=dict[str, Any])
     reversed: frozenset[str] = frozenset()
 

@@ -64,17 +64,17 @@ class RigFile:
         The file itself.
     kind : str
         One of `driver.DRIVERS`.
-    name : str
-        As its owner calls it; may be empty.
+    name : str, optional
+        As its owner calls it.
     known : Path or None
         fit.json or study that describes it.
     performed : str
         That no rig is driven, where that is so.
-    make : str
+    make : str, optional
         Key of the make whose twin it is, with `seed`; beside a description, which is then what is known of it.
-    vendor : str
-        Whose data sheet says the rest; may be empty.
-    port : str
+    vendor : str, optional
+        Whose data sheet says the rest.
+    port : str, optional
         Of a serial rig.
     record : Path or None
         That a replay plays.
@@ -91,13 +91,13 @@ class RigFile:
 
     path: Path
     kind: str
-    name: str = ""
+    name: str | None = None
     known: Path | None = None
-    make: str = ""
+    make: str | None = None
     performed: str = ""
     seed: int = 0
-    vendor: str = ""
-    port: str = ""
+    vendor: str | None = None
+    port: str | None = None
     record: Path | None = None
     at: str = "inverted"
     zero: str = "hanging"
@@ -247,9 +247,9 @@ def read_rig_file(path: Path) -> RigFile:
     if not 0 <= tolerance < 1:
         raise loadings.error("tolerance", 'tolerance is a share of a piece from 0 to below 1, such as "0.2 %"')
     return RigFile(
-        path=path, kind=kind, performed=driver.performed, name=texts.get("name", ""),
+        path=path, kind=kind, performed=driver.performed, name=texts.get("name"),
         known=None if known is None else place / known,
-        make=texts.get("make", ""), seed=seed, vendor=texts.get("vendor", ""), port=texts.get("port", ""),
+        make=texts.get("make"), seed=seed, vendor=texts.get("vendor"), port=texts.get("port"),
         record=place / texts["record"] if "record" in texts else None, at=texts.get("at", "inverted"),
         zero=texts.get("zero", "hanging"), board=board, tolerance=tolerance,
         added=tuple(str(a) for a in loadings.entries("added")),

@@ -62,7 +62,7 @@ class RunRequest:
     check: bool = True
     watch: bool = True
     from_rest: bool = False
-    accept: str = ""
+    accept: str | None = None
     settled: bool = False
     own_process: bool = False
 
@@ -263,7 +263,7 @@ def run_rig(
         seconds=request.seconds, log=path, mode=MODES[request.mode], check=request.check,
         zero=not request.settled,
         rig_text=read_text(request.rig),
-        references=references, accepted=request.accept.strip() if basis.level == NOT_TRUSTED else "",
+        references=references, accepted=(request.accept or "").strip() if basis.level == NOT_TRUSTED else "",
     )  # fmt: skip
     units = {c.name: c.unit for c in model.plant.coordinates}
     limits = file.limits(units, model.unit, usual_limits(model))
@@ -285,7 +285,7 @@ def run_rig(
 
 def _check_accepted(request: RunRequest, basis: Basis) -> None:
     """Refuse to arm a law from a model that is not trusted, unless somebody says why it runs all the same."""
-    if basis.level == NOT_TRUSTED and not request.accept.strip():
+    if basis.level == NOT_TRUSTED and not (request.accept or "").strip():
         raise BadInput(
             f"the law of {request.law} is not armed on hardware, for its model is not trusted: {basis.sentence} "
             'Identify the rig until it is, or say why it runs all the same, which the log keeps: --accept "REASON".'

@@ -20,6 +20,7 @@ from upright.rig.hardware import (
     check_vendor,
     counts_unit,
     driven_unit,
+    force_unit,
     turn_of,
 )
 from upright.study.sensors import Sensor, drive_sign, read_sensors
@@ -40,8 +41,8 @@ def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collec
         What the logs call their rig, which counts where the study gives no name and they agree.
     """
     section, actuator = study.section("rig"), study.section("actuator")
-    called = section.text_of("name", "bench 3") if "name" in section else ""
-    vendor = section.text_of("vendor", VENDORS[0]) if "vendor" in section else ""
+    called = section.text_of("name", "bench 3") if "name" in section else None
+    vendor = section.text_of("vendor", VENDORS[0]) if "vendor" in section else None
     with section.at("vendor"):
         check_vendor(vendor)
     entries = {
@@ -95,7 +96,7 @@ def _encoder(section: Section, sensor: Sensor) -> dict[str, Entry]:
         text = isinstance(sensor.offset, str)
         with section.at("offset"):
             offset = _offset(sensor)
-        out[f"offset.{c.name}"] = Entry(value=offset, unit=c.unit if text else sensor.unit, source="known")
+        out[f"offset.{c.name}"] = Entry(value=offset, unit=c.unit if text else sensor.unit or "", source="known")
     return out
 
 
@@ -129,8 +130,3 @@ def rig_of_numbers(plant: Plant, name: str, values: Mapping[str, float], per: st
     unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
     sign, as_commanded = hardware.as_commanded()
     return Rig(plant=plant, name=name, gain=sign * values.get(GAIN, 1.0), unit=unit, hardware=as_commanded)
-
-
-def force_unit(kind: type[Plant]) -> str:
-    """Unit of the plant's input, "" without one."""
-    return kind.inputs[0].unit if kind.inputs else ""

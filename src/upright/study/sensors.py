@@ -28,28 +28,28 @@ _GAP, _HOPELESS = 5, 100  # periods without a sample: reported, refused
 class Sensor:
     """Column of a log that measures one coordinate, or a sum `of` several: ``sign * scale * (reading - offset)``.
 
-    `of` has the factor of each coordinate in the sum; empty is the coordinate itself. `unit` "" means as the log says.
-    `scale` None means that unit and counts say all; on a column of another kind, such as V, it is SI per unit of the
-    column. `offset` is a reading, as text or in the column's unit. `resolution` is in SI; 0 means not given.
+    `of` has the factor of each coordinate in the sum; empty is the coordinate itself. Without a `unit` it is as the log
+    says. `scale` None means that unit and counts say all; on a column of another kind, such as V, it is SI per unit of
+    the column. `offset` is a reading, as text or in the column's unit. `resolution` is in SI.
     """
 
     coordinate: Coordinate
     column: str
     of: Mapping[str, float] = field(default_factory=dict[str, float])
-    unit: str = ""
-    counts_per_rev: float = 0.0
-    counts_per_m: float = 0.0
+    unit: str | None = None
+    counts_per_rev: float | None = None
+    counts_per_m: float | None = None
     scale: float | None = None
     sign: float = 1.0
     offset: float | str = 0.0
-    resolution: float = 0.0
+    resolution: float | None = None
 
     @property
-    def per_count(self) -> float:
-        """SI per count, 0 when not given."""
-        if self.counts_per_rev:
+    def per_count(self) -> float | None:
+        """SI per count, where the counts are given."""
+        if self.counts_per_rev is not None:
             return 2 * math.pi / self.counts_per_rev
-        return 1 / self.counts_per_m if self.counts_per_m else 0.0
+        return None if self.counts_per_m is None else 1 / self.counts_per_m
 
     def column_unit(self, record: Record, readings: Array) -> str:
         """Unit of the column; whole numbers are taken for counts when counts_per_* is given and no unit is."""
@@ -95,10 +95,10 @@ class Sensor:
         if self.coordinate.unit == "rad" and np.abs(np.diff(values)).max(initial=0.0) > 1.5 * math.pi:
             values = np.asarray(np.unwrap(values), dtype=np.float64)
             notes = (f"{self.column} jumps by a turn and was unwrapped",)
-        return values, self.resolution or self.per_count, notes
+        return values, self.resolution or self.per_count or 0.0, notes
 
 
-def _placed(readings: Array, zero: float, factor: float, step: float) -> Array:
+def _placed(readings: Array, zero: float, factor: float, step: float | None) -> Array:
     """Coordinate [SI] from readings, a text's rounding undone, so that no unit it was written in makes a difference.
 
     Angles on the grid of an encoder's `step` [SI] are put there; 250 mm are 0.25 m to the last bit.
@@ -124,15 +124,15 @@ class Drive:
     `place` says where the study states it.
     """
 
-    what: str = ""
-    unit: str = ""
+    what: str | None = None
+    unit: str | None = None
     scale: float = 1.0
     sign: float = 1.0
     place: tuple[str | int, ...] = ()
 
     def read(self, record: Record) -> Array:
         """Command (N,) in the drive's unit at the record's own instants."""
-        if not self.what:
+        if self.what is None:
             return np.zeros(record.t.size)
         return self.sign * units.converted(expressions.evaluate(self.what, record.signals, record.t), self.scale)
 
@@ -261,7 +261,7 @@ def read_sensor(section: Section, coordinate: Coordinate, plant: type[Plant]) ->
             right = "counts_per_m" if coordinate.unit == "m" else "counts_per_rev"
             raise section.error(key, f"{name} is in {coordinate.unit}, so give {right} or scale, not {key}")
     per = {
-        key: section.stated(key, unit)[0] if key in section else 0.0
+        key: section.stated(key, unit)[0] if key in section else None
         for key, unit in (("counts_per_rev", "1"), ("counts_per_m", "1/m"))
     }
     return Sensor(
@@ -272,7 +272,7 @@ def read_sensor(section: Section, coordinate: Coordinate, plant: type[Plant]) ->
         scale=_scale(section, coordinate) if "scale" in section else None,
         sign=read_sign(section),
         offset=_offset(section),
-        resolution=section.stated("resolution", coordinate.unit)[0] if "resolution" in section else 0.0,
+        resolution=section.stated("resolution", coordinate.unit)[0] if "resolution" in section else None,
         **per,
     )
 
@@ -290,10 +290,10 @@ def _sum(section: Section, coordinate: Coordinate, plant: type[Plant]) -> dict[s
     return {} if factors == {coordinate.name: 1.0} else factors
 
 
-def read_unit(section: Section) -> str:
-    """Unit that a table states, "" when it does not."""
+def read_unit(section: Section) -> str | None:
+    """Unit that a table states."""
     if "unit" not in section:
-        return ""
+        return None
     unit = section.text_of("unit", "counts")
     with section.at("unit"):
         units.scale(unit)
@@ -376,7 +376,7 @@ def _drive(own: Section, shared: Section, *, free: bool) -> Drive:
     if both.values and not free and "column" not in source and "expression" not in source:
         raise both.error(next(iter(both.values)), 'a drive needs column = "v" or expression = "2.5*(0.2 - z)"')
     key = "column" if "column" in source else "expression"
-    what = "" if free or key not in source else source.text_of(key, "v")
+    what = None if free or key not in source else source.text_of(key, "v")
     return Drive(
         what=f"`{what}`" if key == "column" and what else what,
         unit=read_unit(both),

@@ -274,7 +274,7 @@ def _hardware(content: Mapping[str, Any], values: Mapping[str, float]) -> Hardwa
         if drive in values and not math.isclose(value, values[drive], rel_tol=1e-9):
             raise BadInput(f"{place}.value is {value:g}, and parameters.{drive} is {values[drive]:g}")
         entries[name] = Entry(value=value, unit=unit, source=source)
-    name, vendor = (_text(stored.get(key, ""), f"rig.{key}") for key in ("name", "vendor"))
+    name, vendor = (_text(stored.get(key) or "", f"rig.{key}") or None for key in ("name", "vendor"))
     return Hardware(name=name, vendor=check_vendor(vendor), entries=entries)
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from upright.errors import BadInput
-from upright.physics import Plant, name_of
 from upright.rig import Rig
-from upright.study.description import force_unit, read_hardware, rig_with_guesses
+from upright.rig.hardware import force_unit
+from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.rig import read_plant, read_rig
 from upright.study.sensors import drive_unit
 from upright.study.stored_fit import read_fit
@@ -31,11 +31,6 @@ def read_stored_rig(path: Path, *, seed: int = 0, draws: int = 200) -> Rig:
 
         return read_mjcf(path).rig
     return read_fit(path).rig(seed=seed, draws=draws) if path.suffix == ".json" else _from_study(path)
-
-
-def rig_of_plant(plant: Plant) -> Rig:
-    """A plant with the numbers that somebody gave, its command being its force."""
-    return Rig(plant=plant, name=name_of(type(plant)) or type(plant).__name__, unit=force_unit(type(plant)))
 
 
 def _from_study(path: Path) -> Rig:

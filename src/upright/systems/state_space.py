@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +19,27 @@ Array = NDArray[np.float64]
 Roots = NDArray[np.complex128]
 
 
+class HasMatrices(Protocol):
+    """A linear model of another package by its matrices, such as `control.StateSpace`."""
+
+    A: Any
+    B: Any
+
+
+class HasPolynomials(Protocol):
+    """A transfer function of another package, such as `control.TransferFunction`."""
+
+    num: Any
+    den: Any
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class StateSpace(Shown):
     """Linear model ``x' = A x + B u, y = C x + D u``; with a period `dt`, ``x[k+1] = A x[k] + B u[k]``.
 
     It unpacks as ``A, B, C, D`` (a sampled one with its dt behind them), so that ``control.ss(*model)`` and
-    ``scipy.signal.StateSpace(*model[:4])`` take it.
+    ``scipy.signal.StateSpace(*model[:4])`` take it. `to_control` keeps the names of its signals. python-control takes
+    nothing but its own classes, so ``control.ss(model)`` is its TypeError.
 
     Parameters
     ----------
@@ -286,7 +301,7 @@ class StateSpace(Shown):
         return control.StateSpace(self.A, self.B, self.C, self.D, self.dt or 0, **names)
 
     @classmethod
-    def of(cls, model: Any) -> StateSpace:
+    def of(cls, model: LinearForm) -> StateSpace:
         """The linear model that any of the usual forms stands for.
 
         Parameters
@@ -319,6 +334,10 @@ class StateSpace(Shown):
             'a linear model is needed: plant.linear("inverted"), a control.StateSpace or TransferFunction, or arrays '
             f"(A, B[, C[, D]]); got {type(model).__name__}."
         )
+
+
+LinearForm = StateSpace | HasMatrices | HasPolynomials | Sequence[ArrayLike]
+"""What `StateSpace.of` reads: a model of this package or of python-control, or arrays ``(A, B[, C[, D[, dt]]])``."""
 
 
 def _realised(transfer: Any) -> Any:

@@ -63,7 +63,7 @@ class Answer(Generic[V]):
         return tuple(self._drawings())
 
     def plot(self, name: str | None = None) -> Any:
-        """Matplotlib figure of the chapter's first picture, or of the one called `name`.
+        """Matplotlib figure of the chapter's first picture, or of the one called `name`; its SVG where a run was kept.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class Answer(Generic[V]):
             raise BadInput(f"plot draws {', '.join(drawings)}, got '{name}'; {nearest(name, drawings)}")
         draw = drawings[name].draw
         if isinstance(draw, str):
-            raise BadInput(f"the picture '{name}' was stored as SVG; take it from .report(), or make it again.")
+            return StoredPicture(draw)
         return draw()
 
     def _drawings(self) -> dict[str, Picture]:
@@ -100,6 +100,13 @@ class Answer(Generic[V]):
         from upright.report.html import write_html
 
         return write_html(path, self.chapter)
+
+
+class StoredPicture(str):
+    """SVG of a picture that an earlier run drew; a notebook shows it."""
+
+    def _repr_svg_(self) -> str:
+        return str(self)
 
 
 def as_text(chapter: Chapter, files: Sequence[Path] = ()) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from upright.errors import BadInput
+from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.renamed import WORN, renamed
@@ -44,6 +44,21 @@ class Laboratory:
     book: Book
     interrupted: bool
     hints: tuple[str, ...] = ()
+
+    def experiment(self, name: str) -> Answer[Any]:
+        """One experiment's numbers and report, by its name: ``lab.experiment("3").plot("track-steps")``.
+
+        Its `pictures` name what `plot` draws, its logs and studies are in the folder of its name.
+
+        Raises
+        ------
+        BadInput
+            When it was not run.
+        """
+        chapters = {c.key: c for c in self.book.chapters}
+        if name not in chapters:
+            raise BadInput(f"experiment '{name}' was not run; {nearest(name, chapters)}")
+        return Answer(chapters[name].numbers, chapters[name])
 
 
 def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
@@ -161,11 +176,7 @@ def lab(
     shared = Workers.of(workers)
     requested = _requested(texts(experiment), itself, quick=quick)
     beside = Path() if out is None else at
-    live = (
-        _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept or "")
-        if itself
-        else None
-    )
+    live = _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept) if itself else None
     rig = rig if live is None else typed(live.file.path)
     laboratory.chosen_experiments(requested, rig, live)  # says what is wrong with the call before anything is written
     with _ctrl_c() as pressed:
@@ -210,7 +221,7 @@ def _requested(experiments: Sequence[str], itself: bool, *, quick: bool) -> Sequ
 def _live(
     rig: str, folder: Path, ask: Callable[[str], bool] | None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, nonideal: bool, alone: bool,
-    accept: str,
+    accept: str | None,
 ) -> LiveStand:  # fmt: skip
     """The rig of a RIG.toml; what it cannot do is reported first."""
     from upright.experiments.stand.live import live_stand, nobody, nobody_watches
@@ -285,11 +296,11 @@ def reproduce(
         Of a `Reproduced`.
     """
     from upright.paper.chapter import chapter
-    from upright.paper.reproduce import reproduce as again
+    from upright.paper.reproduce import reproduce_tables
     from upright.rig.makes import NOMINAL
 
     at = folder_if_given(out, pdf)
-    result = again(NOMINAL, seed)
+    result = reproduce_tables(NOMINAL, seed)
     page = chapter(result)
     return Answer(result, page, [] if at is None else write_page(page, at / "reproduce.html", pdf))
 

@@ -47,7 +47,7 @@ def rig_of(source: Any, verb: str, *, seed: int = 0, draws: int = 200) -> Rig:
     if isinstance(source, Study):
         return source.rig
     if isinstance(source, Plant):
-        return stored_rig.rig_of_plant(source)
+        return Rig(plant=source)
     return stored_rig.read_stored_rig(_file(source, verb), seed=seed, draws=draws)
 
 

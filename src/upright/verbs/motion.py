@@ -47,7 +47,8 @@ def simulate(
     seconds : float or str
         Length of the motion [s], or as ``"2 s"``.
     at : str, optional
-        Equilibrium; the one that gains or law are for, else the plant's first.
+        Equilibrium; the one that gains or law are for, else the plant's first. Gains that are for none, an array too,
+        need it of a plant that has several.
     u : float, callable of time, or array, shape (N,) or (N, inputs), optional
         Command, in the unit of the input or of the rig's command; it is added to the law's.
     dt : float or str, optional
@@ -111,6 +112,8 @@ def simulate(
         counts = {n: rig.hardware.value(key, 0.0) for n, key in stated.items() if key in rig.hardware.entries}
     steps = _steps(plant, counts)
     loop = _loop(plant, law, point, dt, memory, largest, steps)
+    if loop is not None:
+        _check_named(plant, law, at)
     if rig is not None and isinstance(loop, Law):  # late and rounded as the rig is, once
         loop = replace(loop, delay=0.0, resolution=steps, command_resolution=rig.converter)
     if rig is not None and not isinstance(law, Gains | Law | Rule | None):
@@ -208,6 +211,16 @@ def _point(plant: Plant, law: Any, at: str | None) -> dict[str, float]:
             f'there, .linear("{at}"), or pass the bare array to run it all the same.'
         )
     return wanted
+
+
+def _check_named(plant: Plant, law: Any, at: str | None) -> None:
+    """Refuse gains that say nothing of their equilibrium where nobody names it and there are several."""
+    if at is None and len(plant.equilibria) > 1 and not isinstance(law, Law | Rule) and _own_point(plant, law) is None:
+        named = " or ".join(f'at="{name}"' for name in plant.equilibria)
+        raise BadInput(
+            f"these gains do not say about which equilibrium they hold; say {named}. Those that up.place(plant.linear("
+            "...), poles) gives know theirs."
+        )
 
 
 def _own_point(plant: Plant, law: Any) -> dict[str, float] | None:

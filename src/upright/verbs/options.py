@@ -233,9 +233,9 @@ def as_typed(on: Mapping[str, Any]) -> str:
     return out
 
 
-def vendor_of(known: Rig, rig: str, on: RigOptions, source: str) -> str:
-    """Data sheet chosen by the name of a make, ``--rig``, or of the vendor; "" where none is."""
-    vendor = on.get("vendor") or ""
+def vendor_of(known: Rig, rig: str, on: RigOptions, source: str) -> str | None:
+    """Data sheet chosen by the name of a make, ``--rig``, or of the vendor."""
+    vendor = on.get("vendor")
     if not rig:
         return vendor
     from upright.rig.makes import make_of_rig

@@ -114,7 +114,7 @@ def _(rig: Rig) -> Chapter:
     per = force if rig.unit == "1" else f"{force}/{rig.unit}" if force and rig.unit else ""
     allowed = f"; {len(rig.draws)} rigs drawn from its covariance" if rig.draws else ""
     return Chapter(
-        title=rig.name or type(rig.plant).__name__, parts=(*plant.parts, Part("", (rig_table(rig),))),
+        title=rig.name, parts=(*plant.parts, Part("", (rig_table(rig),))),
         verdict=f"{type(rig.plant).__name__} behind a drive of {number(rig.gain)} {unit(per)}".rstrip() + f"{allowed}.",
         detail=rig.basis.sentence,
     )  # fmt: skip

@@ -100,7 +100,7 @@ def test_a_band_keeps_the_frequencies_within_it_its_ends_too(written, tmp_path):
     np.testing.assert_allclose(found.omega, OMEGA[1:4], rtol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["multisine", ""])
+@pytest.mark.parametrize("kind", ["multisine", None])
 def test_logs_that_repeat_one_another_are_averaged_wherever_in_the_period_they_begin(kind, tmp_path):
     """Of 4 n periods the standard error is half that of n, and the response nearer to the truth."""
     rng = np.random.default_rng(5)

@@ -70,7 +70,7 @@ def test_a_law_runs_from_its_first_sample_to_its_last(stands, tmp_path):
         run = stand.hold(law, AT, tmp_path, "rest", 50 * stand.rig.period, reference=reference, pushes=pushes)
         assert run.trial.t.size == 51
         assert run.trial.t[-1] == pytest.approx(50 * stand.rig.period)
-        assert run.ended == ""
+        assert run.ended is None
         assert not run.overtravel
 
 

@@ -289,6 +289,17 @@ def test_zero_is_where_a_body_lay_before_the_command(x, u, guess, hangs, window,
     assert read == pytest.approx(last if zero == "rest" else zero, abs=0.021 if hangs else 1e-12)
 
 
+@pytest.mark.parametrize("idle", [0, 60])
+def test_an_arm_that_may_stand_anywhere_is_zero_where_it_begins_and_not_where_a_drive_took_it(idle: int) -> None:
+    """A pendulum that swings freely moves the arm before the first command, and the drive turns it by whole turns."""
+    t = 0.01 * np.arange(1000)
+    arm, pendulum = 0.3 * np.sin(6 * t) - 4.0 * t, 0.5 * np.cos(6 * t)
+    u = np.where(np.arange(1000) < idle, 0.0, np.sign(np.sin(2 * t)))
+    record = log(inputs=("u",), u=u, psi=arm, theta=pendulum)
+    found = recognise(record, inspect(record), "furuta")
+    assert found.rest["psi"] == 0.0
+
+
 RAMP = np.arange(1000.0)
 
 

@@ -120,16 +120,16 @@ class LogRequest:
 
     Attributes
     ----------
-    make : str
-        Whose design gives plant and guesses; empty for a response without a fit, or when a study says it.
-    command : str
-        Column of the command; the log's own when empty.
+    make : str, optional
+        Whose design gives plant and guesses; None for a response without a fit, or when a study says it.
+    command : str, optional
+        Column of the command; the log's own when omitted.
     signals : mapping of str to str
         Column by coordinate; as the log names them when empty.
     counts : mapping of str to float
         Counts per rad or m by coordinate, negative when they count the other way.
-    kind : str
-        Excitation; recognised from the command when empty.
+    kind : str, optional
+        Excitation; recognised from the command when omitted.
     hold : float, optional
         Time for which the converter holds a command [s].
     band : (float, float)
@@ -140,11 +140,11 @@ class LogRequest:
         Of the starts.
     """
 
-    make: str = ""
-    command: str = ""
+    make: str | None = None
+    command: str | None = None
     signals: Mapping[str, str]
     counts: Mapping[str, float]
-    kind: str = ""
+    kind: str | None = None
     hold: float | None = None
     band: tuple[float, float] | None = None
     known: Mapping[str, tuple[float, float]]
@@ -188,8 +188,8 @@ def response_of_logs(
     else:
         response = _logs(sources, request)
     if request.make and rest is None:
-        rest, plant = _designed(request), make_named(request.make).plant_name
-        hardware = Hardware(vendor=make_named(request.make).vendor)
+        make = make_named(request.make)
+        rest, plant, hardware = _designed(request, make), make.plant_name, Hardware(vendor=make.vendor)
     folder.mkdir(parents=True, exist_ok=True)
     names = tuple(s.name for s in sources)
     if rest is None:
@@ -201,9 +201,8 @@ def response_of_logs(
     return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
 
 
-def _designed(request: LogRequest) -> GreyBox:
+def _designed(request: LogRequest, make: Make) -> GreyBox:
     """Numbers of a make: nominal where not specified, known within a tolerance where a bench usually measures them."""
-    make = make_named(request.make)
     values = make.rig.plant.parameters()
     for name in request.known:
         if name not in (*values, "actuator.gain", "actuator.delay", "actuator.lag"):

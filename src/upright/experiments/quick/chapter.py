@@ -55,7 +55,7 @@ def _sentence(clause: str) -> str:
 def _detail(result: QuickRun) -> str:
     if result.wiring.wrong:
         return " ".join(_sentence(f"{what}: {remedy}") for what, remedy in result.wiring.wrong)
-    if result.law is None:
+    if result.share is None:
         return ""
     return f"Of {LANES} rigs that the fit allows, {result.share:.0%} were caught in simulation beforehand."
 
@@ -66,11 +66,14 @@ def _wiring_part(result: QuickRun) -> Part:
     if w.moves and w.swings:
         for name, scale, error in zip(w.names, w.scale, w.error, strict=True):
             rows.append((f"{name}, shown over true", number(scale, 4), number(2 * error, 2), ""))
-        rows += [
-            ("force of the drive over its description", number(w.drive, 3), number(2 * w.drive_error, 2), ""),
-            ("command lost to either side (dead zone)", number(w.dead_zone, 3), number(2 * w.dead_error, 2), unit),
-            ("delay and lag of the drive", number(1e3 * w.delay, 2), "", "ms"),
-        ]
+    for what, value, error, of in (
+        ("force of the drive over its description", w.drive, w.drive_error, ""),
+        ("command lost to either side (dead zone)", w.dead_zone, w.dead_error, unit),
+    ):
+        if value is not None and error is not None:
+            rows.append((what, number(value, 3), number(2 * error, 2), of))
+    if w.delay is not None:
+        rows.append(("delay and lag of the drive", number(1e3 * w.delay, 2), "", "ms"))
     rows += [(f"command at which {w.names[0]} broke away, {side}", number(u, 3), "", unit)
              for side, u in zip(("up", "down"), w.broke_away, strict=True)]  # fmt: skip
     wrong = tuple(_sentence(f"{what}: {remedy}") for what, remedy in w.wrong) or (
@@ -130,7 +133,7 @@ def _steps(result: QuickRun) -> tuple[Step, ...]:
 
 
 def _findings(result: QuickRun) -> tuple[KeyNumber, ...]:
-    if result.ascent is None:
+    if result.refused is not None:
         return (KeyNumber(what="wiring" if result.wiring.wrong else "no loop", value=result.refused),)
     return (KeyNumber(what="time at the rig", value=f"{result.seconds:.0f} s"),)
 

@@ -54,13 +54,13 @@ class QuickRun:
         As identified.
     study, fit : Study, Fit or None
     law : SwingUp or None
-    share : float
-        Of the rigs that the fit allows, how many are caught in simulation.
+    share : float or None
+        Of the rigs that the fit allows, how many are caught in simulation; None where no law was designed.
     ascent : Ascent or None
-    ended : str
+    ended : str or None
         Why the swing-up ended early.
-    refused : str
-        Why a loop was not closed; empty where it was.
+    refused : str or None
+        Why a loop was not closed.
     seconds : float
         At the rig, by its own clock [s].
     """
@@ -74,10 +74,10 @@ class QuickRun:
     study: Study | None = None
     fit: Fit | None = None
     law: SwingUp | None = None
-    share: float = 0.0
+    share: float | None = None
     ascent: Ascent | None = None
-    ended: str = ""
-    refused: str = ""
+    ended: str | None = None
+    refused: str | None = None
 
     @property
     def upright(self) -> bool:
@@ -150,7 +150,7 @@ def _study(stand: LiveStand, log: Record, mode: Array, check: WiringCheck, folde
     A dead zone that they show is estimated too.
     """
     more = {}
-    if check.dead_zone > SURE * check.dead_error:
+    if check.dead_zone is not None and check.dead_error is not None and check.dead_zone > SURE * check.dead_error:
         more = {"dead_zone": {"guess": f"{check.dead_zone:.6g} {stand.rig.unit}", "min": 0}}
     t, kicks, calms = log.t, np.flatnonzero(mode >= KICKS), np.flatnonzero(mode >= CALMS)
     runs = [

@@ -76,7 +76,7 @@ class MeasuredRun:
 
     trial: Trial
     score: Score
-    ended: str = ""
+    ended: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

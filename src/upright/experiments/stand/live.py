@@ -19,7 +19,7 @@ from upright.logs.layout import library
 from upright.readers import read
 from upright.realtime.session import RunState
 from upright.records import Array, Record
-from upright.rig.makes import MAKES, Make, make_of_vendor
+from upright.rig.makes import Make, make_named, make_of_vendor
 from upright.rigs.protocol import Fault
 from upright.rigs.rigfile import RigFile, read_rig_file
 from upright.running.rig import model_and_truth, usual_limits
@@ -59,7 +59,7 @@ class LiveStand(TestStand):
     file: RigFile
     person: Callable[[str], bool] = nobody
     watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches
-    accept: str = ""
+    accept: str | None = None
 
     @property
     def text(self) -> str:
@@ -191,12 +191,13 @@ def run_of(result: RigRun, at: str, origin: Sequence[float] | None = None) -> St
     record = result.log.record()
     shown = record.replace(t=t, signals={n: signals.get(n, v) for n, v in record.signals.items()})
     trial = Trial(rig=result.model, at=at, t=t, x=x, u=result.log.columns[APPLIED], rest=point, record=shown)
-    return StandRun(trial=trial, ended=result.end.stopped, overtravel=bool(result.end.faults & Fault.OVERTRAVEL))
+    left = bool(result.end.faults & Fault.OVERTRAVEL)
+    return StandRun(trial=trial, ended=result.end.stopped or None, overtravel=left)
 
 
 def live_stand(
     path: Path, person: Callable[[str], bool] = nobody,
-    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches, accept: str = "",
+    watching: Callable[[], AbstractContextManager[Watch]] = nobody_watches, accept: str | None = None,
 ) -> LiveStand:  # fmt: skip
     """The rig of a RIG.toml.
 
@@ -229,6 +230,6 @@ def live_stand(
 def _make(file: RigFile) -> Make | None:
     """The make that RIG.toml or the description says it is of."""
     if file.known is None:
-        return MAKES[file.make]
+        return make_named(file.make)
     known = read_stored_rig(file.known)
     return make_of_vendor(file.vendor or known.hardware.vendor, known.plant)

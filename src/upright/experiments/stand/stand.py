@@ -28,7 +28,7 @@ class StandRun:
     """
 
     trial: Trial
-    ended: str = ""
+    ended: str | None = None
     overtravel: bool = False
 
 
@@ -50,12 +50,12 @@ class TestStand(ABC):
         What a twin behind the protocol truly is.
     make : Make or None
         None of a rig of one's own.
-    vendor : str
-        Whose data sheet says what a fit of it does not; may be empty.
+    vendor : str, optional
+        Whose data sheet says what a fit of it does not.
     performed : str
         `basis.SIMULATED` where no rig is driven.
-    zero : str
-        Equilibrium at which the encoders are zeroed; the plant's first where it has no such.
+    zero : str, optional
+        Equilibrium at which the encoders are zeroed; the plant's first when omitted, or where it has no such.
     room : float
         How far the driven coordinate may go [m or rad], where that is less than the rig itself says.
     speeds : tuple of float
@@ -76,9 +76,9 @@ class TestStand(ABC):
     rig: Rig
     true_rig: Rig | None = None
     make: Make | None = None
-    vendor: str = ""
+    vendor: str | None = None
     performed: str = SIMULATED
-    zero: str = ""
+    zero: str | None = None
     room: float = math.inf
     speeds: tuple[float, ...] = ()
     fit: Path | None = None
@@ -95,7 +95,7 @@ class TestStand(ABC):
     def resting(self) -> str:
         """Equilibrium at which the encoders are zeroed."""
         kinds = self.rig.plant.equilibria
-        return self.zero if self.zero in kinds else next(iter(kinds))
+        return self.zero if self.zero is not None and self.zero in kinds else next(iter(kinds))
 
     @property
     def travel(self) -> float:

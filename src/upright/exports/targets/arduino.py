@@ -12,9 +12,9 @@ _TRAVEL, _SPEED, _START = ({"rad": a, "m": b} for a, b in ((3.0, 0.3), (40.0, 3.
 _RESOLUTION = 1.0
 
 
-def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name, in the folder ``law`` that the sketch has to be called after."""
-    texts = c.files(made, test, single=single)
+    texts = dict(c.TARGET.write(made, test, single))
     del texts["law_selftest.c"]
     return {f"law/{name}": text for name, text in {"law.ino": sketch(made), "board.h": board(made), **texts}.items()}
 
@@ -70,7 +70,7 @@ def _narrow(made: SampledController, miss: str) -> str:
 
 
 TARGET = LawTarget(
-    name="arduino", order=15, title="an Arduino sketch", write=files,
+    name="arduino", order=15, title="an Arduino sketch", write=_files,
     rules=True, warn=_narrow,
     test="arduino-cli compile --upload -b arduino:avr:mega -p PORT {folder}/law && arduino-cli monitor -p PORT "
     "-c baudrate=115200",

@@ -14,7 +14,7 @@ from upright.laws import Rule
 from upright.laws.linear import Array
 
 
-def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {
         "law.h": header(made, single=single),
@@ -105,7 +105,7 @@ def _table(name: str, rows: Array, single: bool) -> str:
 
 
 TARGET = LawTarget(
-    name="c", order=10, title="C99", write=files, rules=True,
+    name="c", order=10, title="C99", write=_files, rules=True,
     test="cd {folder} && cc -std=c99 -O2 law.c law_selftest.c -lm && ./a.out",
     onward="Call law_start once and law_step at every sample.",
 )  # fmt: skip

@@ -10,7 +10,7 @@ from upright.report.page import Chapter, Part, Points, Step
 from upright.report.symbols import typed
 
 
-def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+def _write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """The unit, with a library where a C compiler is found."""
     unit, file = unit_of(export.rig), export.folder / "rig.fmu"
     content, where = archive(unit)
@@ -34,4 +34,4 @@ def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     return {file.name: content}, page
 
 
-TARGET = RigTarget(name="fmu", order=45, write=write)
+TARGET = RigTarget(name="fmu", order=45, write=_write)

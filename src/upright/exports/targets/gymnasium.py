@@ -26,7 +26,7 @@ def module(rig: str, fit: str, limit: float | None, first_line: str = "") -> tup
                         options=options)  # fmt: skip
 
 
-def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+def _write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """An environment of Gymnasium, as a module that registers it."""
     rig, at = export.rig, export.folder
     lanes = Episodes(rig, 1, limit=export.limit)
@@ -53,4 +53,4 @@ def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     return {file.name: text.encode()}, page
 
 
-TARGET = RigTarget(name="gymnasium", order=35, write=write, limited=True, draws=DRAWS)
+TARGET = RigTarget(name="gymnasium", order=35, write=_write, limited=True, draws=DRAWS)

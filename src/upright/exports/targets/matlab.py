@@ -12,7 +12,7 @@ from upright.exports.vector import ReplayVector
 from upright.laws.linear import Array
 
 
-def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name."""
     return {"law_step.m": step_function(made, single=single), "law_selftest.m": selftest_function(test, single=single)}
 
@@ -20,7 +20,7 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
 def simulink_block(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Texts by file name for Simulink: the same function, a level-2 S-function that calls it, what makes its block."""
     return {
-        **files(made, test, single=single),
+        **_files(made, test, single=single),
         "law_sfun.m": _s_function(made, single=single),
         "law_block.m": filled("law_block.m"),
     }
@@ -76,7 +76,7 @@ def _s_function(made: SampledController, *, single: bool) -> str:
 
 
 MATLAB = LawTarget(
-    name="matlab", order=25, title="MATLAB and GNU Octave", write=files,
+    name="matlab", order=25, title="MATLAB and GNU Octave", write=_files,
     test="octave-cli --path {folder} --eval law_selftest",
     onward="[u, s] = law_step(s, y) at every sample, with s = [] before the first.",
 )  # fmt: skip

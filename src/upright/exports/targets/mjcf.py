@@ -10,7 +10,7 @@ from upright.report.page import Chapter, Step
 from upright.report.symbols import typed
 
 
-def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
+def _write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     """A model of MuJoCo, and what MuJoCo has otherwise."""
     text, remarks = model(export.rig)
     file = export.folder / "rig.xml"
@@ -24,4 +24,4 @@ def write(export: RigExport) -> tuple[Mapping[str, bytes], Chapter]:
     return {file.name: text.encode()}, chapter
 
 
-TARGET = RigTarget(name="mjcf", order=40, write=write)
+TARGET = RigTarget(name="mjcf", order=40, write=_write)

@@ -22,7 +22,7 @@ _LANGUAGE = Language(
 )  # fmt: skip
 
 
-def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
+def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[str, str]:
     """Text by file name."""
     if single:
         raise BadInput("Python's numbers are doubles; leave --float out, or take the target c.")
@@ -55,6 +55,6 @@ def files(made: SampledController, test: ReplayVector, single: bool) -> dict[str
 
 
 TARGET = LawTarget(
-    name="python", order=20, title="Python", write=files, rules=True,
+    name="python", order=20, title="Python", write=_files, rules=True,
     test="python {folder}/law.py", onward="law = Law(); u = law.step(y) at every sample.",
 )  # fmt: skip

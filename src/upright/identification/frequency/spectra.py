@@ -35,8 +35,8 @@ MOST = 80
 
 
 def response_of(
-    records: Sequence[Record], *, command: str, outputs: Sequence[str], kind: str = "", hold: float | None = None,
-    resolution: Sequence[float] = (), band: tuple[float, float] | None = None,
+    records: Sequence[Record], *, command: str, outputs: Sequence[str], kind: str | None = None,
+    hold: float | None = None, resolution: Sequence[float] = (), band: tuple[float, float] | None = None,
 ) -> FrequencyResponse:  # fmt: skip
     """Response that one log, or several repeats, hold.
 
@@ -46,7 +46,7 @@ def response_of(
         Evenly sampled, but for gaps between sines.
     command, outputs : str and sequence of str
         Columns, in the units of the response.
-    kind : {"", "sines", "multisine", "sweep"}
+    kind : {"sines", "multisine", "sweep"}, optional
         Excitation; recognised from the command when empty.
     hold : float, optional
         Time for which the converter holds a command [s]; one sample when omitted.
@@ -60,14 +60,14 @@ def response_of(
     NotIdentifiable
         When the command asks nothing, or holds too little of it.
     """
-    if kind not in ("", "sines", "multisine", "sweep"):
+    if kind not in (None, "sines", "multisine", "sweep"):
         raise BadInput(f"a log holds sines, a multisine or a sweep, not '{kind}'.")
     quanta = np.array(resolution if len(resolution) else [0.0] * len(outputs))
     hold = records[0].period if hold is None else hold
     u = records[0][command]
     if not np.ptp(u) > 0:
         raise NotIdentifiable(f"The command '{command}' never changes, so nothing was excited; name its column.")
-    pieces = [piece for r in records for piece in sines_in(r.t, r[command])] if kind in ("", "sines") else []
+    pieces = [piece for r in records for piece in sines_in(r.t, r[command])] if kind in (None, "sines") else []
     covered = sum(b - a for a, b, _ in pieces) / sum(len(r) for r in records)
     if kind == "sines" or (not kind and covered > 0.5):
         response = _sines(records, command, outputs, quanta, hold)

@@ -113,7 +113,7 @@ def calibrated(best: Optimum) -> Bands | None:
         names=tuple(problem.unknowns[i].name for i in shared),
         covariance=possible(covariance[np.ix_(shared, shared)] * np.outer(slope, slope)),
         reached=reached(problem.rig, [track.run for track in best.problem.tracks]),
-        logs=tuple(dict.fromkeys(log for track in problem.tracks if (log := log_of(track.run)))),
+        logs=tuple(dict.fromkeys(log for track in problem.tracks if (log := log_name(track.run)))),
     )
     missed = [_missed(problem, met[block.run], block, covariance, best.x, bands) for block in blocks]
     if len(blocks) < 2:
@@ -204,7 +204,7 @@ def _missed(problem: Problem, met: Sensitivity, block: _Block, covariance: Array
     return np.concatenate([np.abs(error[:, k]) / width[c] for k, c in _signals(track)])
 
 
-def log_of(run: Run) -> str:
+def log_name(run: Run) -> str:
     """The log that a run is from, as its source names it; empty where nobody says."""
     return run.source.partition(";")[0]
 
@@ -215,7 +215,7 @@ def of_another_day(bands: Bands, rig: GreyBox, run: Run) -> Array:
     All friction together, and the drive's gain, by `FRICTION` and `GAIN` of themselves. Where the fitted runs are from
     `MANY` logs or more these differed as well, and the covariance holds it already.
     """
-    log = log_of(run)
+    log = log_name(run)
     if not log or not bands.logs or log in bands.logs or len(bands.logs) >= MANY:
         return bands.covariance
     value = {n: p.value for n, p in rig.parameters.items()}

@@ -99,7 +99,13 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
     pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
     window = moving_window(record, inspection, [record[c.name] for c in columns.values()], drive, pushed=pushed)
     inside = (record.t >= window[0]) & (record.t <= window[1])
-    rest = {n: zero_reading(record, inspection, c, drive, window, hangs=n == "theta") for n, c in columns.items()}
+    stated = {n for place in find(plant).equilibria.values() for n in place}
+    rest = {
+        n: zero_reading(
+            record, inspection, c, drive, window, hangs=n == "theta", anywhere=bool(stated) and n not in stated
+        )
+        for n, c in columns.items()
+    }
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
     earlier: tuple[tuple[float, float], ...] = ()
@@ -289,11 +295,13 @@ def _assign(plant: type[Plant], places: list[Column]) -> tuple[dict[str, Column]
 
 
 def zero_reading(
-    record: Record, inspection: Inspection, c: Column, drive: Column | None, window: tuple[float, float], *, hangs: bool
-) -> float:
+    record: Record, inspection: Inspection, c: Column, drive: Column | None, window: tuple[float, float], *,
+    hangs: bool, anywhere: bool = False,
+) -> float:  # fmt: skip
     """Reading at which a coordinate is taken to be zero: before the first command, else where it comes to rest.
 
-    One that `hangs` has its zero where it rests, and not where it is while it swings.
+    One that `hangs` has its zero where it rests, and not where it is while it swings; an arm that may stand `anywhere`
+    where its window begins, and not where a pendulum or a drive has taken it.
     """
     x = record[c.name]
     if drive is not None:
@@ -301,9 +309,12 @@ def zero_reading(
         first = int(np.argmax(u != u[0]))
         before = x[max(0, first - 50) : first]
         angle = c.guess in ANGLES
+        begins = float(x[np.searchsorted(record.t, window[0])])
+        if angle and anywhere:
+            return begins
         if u[0] == 0 and first >= 5 and not (hangs and not _starts_still(x, u)):
             return float(np.median(before))
-        return rest_level(x, inspection, record.t) if angle else float(x[np.searchsorted(record.t, window[0])])
+        return rest_level(x, inspection, record.t) if angle else begins
     return rest_level(x, inspection, record.t)
 
 

@@ -141,7 +141,7 @@ def design(
         if here not in rig.plant.equilibria:
             raise BadInput(f"'{rig.name}' has no equilibrium '{here}'; {nearest(here, rig.plant.equilibria)}")
         loop = completed(
-            rig, rig_entries(rig.plant, rig.unit, on), vendor=on.get("vendor") or "",
+            rig, rig_entries(rig.plant, rig.unit, on), vendor=on.get("vendor"),
             needs=("servo_period", "counts"), who="design",
         )  # fmt: skip
         request = replace(

@@ -48,7 +48,7 @@ def played(
         raise BadInput("in a page velocities come from plain or filtered differences; leave speed out.")
     if (lacks := unplayable(known)) is not None:
         raise BadInput(f"play needs {lacks}.")
-    rig = completed(known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="play")
+    rig = completed(known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor"), who="play")
     speed, memory = on.get("speed") or "filtered", on.get("memory", 0.5)
     request = DesignRequest(
         at="inverted", poles=read_pole_list(poles), period=rig.period, speed=speed, memory=memory,

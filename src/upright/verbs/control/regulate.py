@@ -115,7 +115,7 @@ def regulate(
         known, name, base = rig_of(source, "regulate", seed=seed or 0, draws=draws), called(source), 0.0
         on["vendor"] = vendor_of(known, rig or "", on, name)
         name += as_typed(on)
-    model = completed(known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor") or "", who="regulate")
+    model = completed(known, rig_entries(known.plant, known.unit, on), vendor=on.get("vendor"), who="regulate")
     truth = None if seed is None else twin_of(model, seed)
     result = run_regulation(
         model, None if truth is None else TwinStand(rig=truth), seed or 0, at,

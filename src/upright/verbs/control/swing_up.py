@@ -109,7 +109,7 @@ def swing_up(
         known, on["vendor"] = known_of(identified), vendor_of(identified, rig or "", on, called(source))
         entries = rig_entries(identified.plant, identified.unit, on)
         needs = ("limit", "servo_period", "counts", "travel")
-        model = completed(identified, entries, vendor=on.get("vendor") or "", needs=needs, who="swing-up")
+        model = completed(identified, entries, vendor=on.get("vendor"), needs=needs, who="swing-up")
         described = check is not None or not (model.draws or model.hardware.vendor)
         truth = model if described else twin_of(model, seed)
         doubt = doubts(identified, model, None if described else truth)

@@ -107,7 +107,7 @@ def track(
     else:
         known = rig_of(source, "track")
         shaft_make(known.plant, f"'{known.name}'")
-        entries, vendor = rig_entries(known.plant, known.unit, options), options.get("vendor") or ""
+        entries, vendor = rig_entries(known.plant, known.unit, options), options.get("vendor")
         model = rig_of_file(completed(known, entries, vendor=vendor, who="track"), Path(called(source)).name)
         doubt = doubts(known, model)
     size = si_if_given(step, model.plant.coordinates[-1].unit)

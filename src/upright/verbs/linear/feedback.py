@@ -10,14 +10,14 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput, nearest
 from upright.laws import Law
 from upright.physics import Plant
 from upright.renamed import outside
 from upright.shown import Shown
-from upright.systems import StateSpace
+from upright.systems import LinearForm, StateSpace
 
 if TYPE_CHECKING:
     from upright.gains import Estimator, Margins
@@ -100,7 +100,7 @@ class Gains(Shown):
 
 
 def _model_first(verb: Callable[P, R]) -> Callable[P, R]:
-    """A function of a linear model that is called with any form of one, see `StateSpace.of`.
+    """A function of a linear model that says its form when it is called otherwise.
 
     Loose arrays ``A, B`` in front are taken for ``(A, B)``, for one version with a warning.
     """
@@ -119,7 +119,6 @@ def _model_first(verb: Callable[P, R]) -> Callable[P, R]:
             bound = about.bind(*args, **kwargs)
         except TypeError as error:
             raise BadInput(f"{name} is called as {name}{_form(about)}: {error}.") from None
-        bound.arguments["model"] = _read(bound.arguments["model"], name)
         return verb(*bound.args, **bound.kwargs)
 
     return called
@@ -131,7 +130,7 @@ def _form(about: Any) -> str:
     return str(about.replace(parameters=shown, return_annotation=about.empty))
 
 
-def _read(model: Any, verb: str) -> StateSpace:
+def _read(model: LinearForm, verb: str) -> StateSpace:
     plant = model if isinstance(model, Plant) else getattr(model, "plant", None)
     if isinstance(plant, Plant):
         raise BadInput(
@@ -146,7 +145,7 @@ def _read(model: Any, verb: str) -> StateSpace:
 
 
 @_model_first
-def place(model: Any, poles: Any) -> Gains:
+def place(model: LinearForm, poles: str | ArrayLike) -> Gains:
     """Gains that put the poles of a linear model where requested, by Ackermann's formula.
 
     Parameters
@@ -174,13 +173,14 @@ def place(model: Any, poles: Any) -> Gains:
     from upright.gains import place as placed
     from upright.gains.requests import read_poles
 
+    model = _read(model, "place")
     wanted = read_poles(poles) if isinstance(poles, str) else _complex(poles)
     placement = placed(model.A, model.B, wanted)
     return Gains(K=placement.K, poles=placement.attained, S=None, model=model, sentence=placement.sentence)
 
 
 @_model_first
-def lqr(model: Any, Q: Any, R: Any) -> Gains:
+def lqr(model: LinearForm, Q: str | ArrayLike, R: str | ArrayLike) -> Gains:
     """LQR gains, which minimise the integral of ``x' Q x + u' R u``; ``K, S, E = lqr(...)`` as python-control gives it.
 
     Parameters
@@ -202,11 +202,12 @@ def lqr(model: Any, Q: Any, R: Any) -> Gains:
     BadInput
         When the model or a weight cannot be read or has another size, or no such gains exist.
     """
+    model = _read(model, "lqr")
     return _of_least_cost(model, Q, R)
 
 
 @_model_first
-def dlqr(model: Any, Q: Any, R: Any) -> Gains:
+def dlqr(model: LinearForm, Q: str | ArrayLike, R: str | ArrayLike) -> Gains:
     """LQR gains of a sampled model, which minimise the sum of ``x' Q x + u' R u``; ``K, S, E = dlqr(...)``.
 
     Parameters
@@ -226,6 +227,7 @@ def dlqr(model: Any, Q: Any, R: Any) -> Gains:
     BadInput
         When the model is continuous, it or a weight cannot be read, or no such gains exist.
     """
+    model = _read(model, "dlqr")
     if model.dt is None:
         if model.point is not None or model.name:
             raise BadInput("dlqr takes a sampled model, and this one is continuous; sample it with hold, or use lqr.")
@@ -243,7 +245,9 @@ def _of_least_cost(model: StateSpace, Q: Any, R: Any) -> Gains:
 
 
 @_model_first
-def hold(model: Any, period: Any, delay: float = 0.0, lag: float = 0.0, method: str = "zoh") -> StateSpace:
+def hold(
+    model: LinearForm, period: float | str, delay: float = 0.0, lag: float = 0.0, method: str = "zoh"
+) -> StateSpace:
     """A continuous linear model at its samples, exactly.
 
     Parameters
@@ -270,13 +274,14 @@ def hold(model: Any, period: Any, delay: float = 0.0, lag: float = 0.0, method: 
     """
     from upright.verbs.values import si
 
+    model = _read(model, "hold")
     if model.dt is not None:
         raise BadInput(f"hold samples a continuous model, and this one has a period of {model.dt:g} s already.")
     return model.to_sampled(si(period, "s"), delay, lag, method=method)
 
 
 @_model_first
-def observer(model: Any, poles: Any) -> Estimator:
+def observer(model: LinearForm, poles: str | ArrayLike) -> Estimator:
     """Observer of a sampled model whose error decays with the requested poles.
 
     Parameters
@@ -299,13 +304,14 @@ def observer(model: Any, poles: Any) -> Estimator:
     from upright.gains import placed_observer
     from upright.gains.requests import read_poles
 
+    model = _read(model, "observer")
     if model.dt is None:
         raise BadInput("observer takes a sampled model, and this one is continuous; sample it: hold(model, period).")
     return placed_observer(model, read_poles(poles) if isinstance(poles, str) else _complex(poles))
 
 
 @_model_first
-def margins(model: Any, K: Any = None) -> Margins:
+def margins(model: LinearForm, K: ArrayLike | Gains | Law | None = None) -> Margins:
     """How much a loop stands: gain, phase and delay margins, its least distance to -1, and every crossing.
 
     Parameters
@@ -329,6 +335,7 @@ def margins(model: Any, K: Any = None) -> Margins:
     from upright.gains import margins as as_it_runs
     from upright.gains.margins import loop_margins
 
+    model = _read(model, "margins")
     if isinstance(K, Law):
         if model.dt is None:
             raise BadInput("margins of a Law need the model at its samples: margins(hold(model, law.period), law).")
@@ -351,7 +358,7 @@ def margins(model: Any, K: Any = None) -> Margins:
 
 
 @_model_first
-def prefilter(model: Any, K: Any, output: int | str = 0) -> float:
+def prefilter(model: LinearForm, K: ArrayLike | Gains, output: int | str = 0) -> float:
     """Gain k_pf of ``u = k_pf r - K x`` with which an output comes to rest at the reference r.
 
     Parameters
@@ -373,11 +380,12 @@ def prefilter(model: Any, K: Any, output: int | str = 0) -> float:
     """
     from upright.gains import prefilter as static
 
+    model = _read(model, "prefilter")
     names = model.outputs
     if isinstance(output, str) and output not in names:
         raise BadInput(f"this model has no output '{output}'; {nearest(output, names)}")
     i = names.index(output) if isinstance(output, str) else output
-    if not isinstance(i, int | np.integer) or not 0 <= i < len(names):
+    if not isinstance(i, int | np.integer) or not 0 <= i < len(names):  # type: ignore[reportUnnecessaryIsInstance]
         raise BadInput(f"output is a number from 0 to {len(names) - 1} or one of {', '.join(names)}, got {output}.")
     k = _row_of_gains(K)
     if k.shape != (1, model.A.shape[0]) or model.B.shape[1] != 1:

@@ -127,7 +127,7 @@ def frequency(
     from upright.rig.makes import MAKES
 
     at, options = page_folder(out, pdf), known_options(ResponseOptions, of_log, "frequency")
-    kind = options.get("kind", "")
+    kind = options.get("kind")
     for value, option in ((ask, "--ask"), (kind or "sines", "--kind")):
         if value not in KINDS:
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
@@ -139,8 +139,8 @@ def frequency(
         from upright.verbs.values import si_if_given
 
         request = LogRequest(
-            make=rig or "", command=options.get("command", ""), signals=pairs(options.get("signal"), "--signal"),
-            kind=kind, seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
+            make=rig or None, command=options.get("command") or None, signals=pairs(options.get("signal"), "--signal"),
+            kind=kind or None, seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
             counts={n: _count(n, v) for n, v in pairs(options.get("counts"), "--counts").items()},
             known={n: _known(n, v, rig or "") for n, v in pairs(options.get("known"), "--known").items()},
         )  # fmt: skip

@@ -257,14 +257,14 @@ def _what_moves(plant: Any, verb: str) -> type[Plant] | Rig | None:
     from upright.physics import Plant, find
     from upright.rig import Rig
     from upright.study.load import Study
-    from upright.study.stored_rig import read_stored_rig, rig_of_plant
+    from upright.study.stored_rig import read_stored_rig
 
     if plant is None or isinstance(plant, Rig):
         return plant
     if isinstance(plant, FitAnswer | Study):
         return plant.rig
     if isinstance(plant, Plant):
-        return rig_of_plant(plant)
+        return Rig(plant=plant)
     if isinstance(plant, str | Path):
         path = Path(plant)
         return read_stored_rig(path) if path.suffix in (".json", ".toml", ".xml") or path.is_dir() else find(str(plant))
