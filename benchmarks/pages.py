@@ -72,6 +72,17 @@ def design(out: Path) -> Path:
     return out / "design.html"
 
 
+def compare(out: Path) -> Path:
+    """Two fits of one rig, by a sweep and by free swings, on a swing that one of them saw."""
+    import upright as up
+
+    there = out.parent / "lab"
+    if not there.exists():
+        lab(there)
+    up.compare([there / "1b/fit.json", there / "4/fit.json"], there / "4/release_90.csv", out=out, pdf=True)
+    return out / "comparison.html"
+
+
 def play(out: Path) -> Path:
     import upright as up
 
@@ -90,6 +101,14 @@ PAGES: dict[str, Callable[[Path], Path]] = {
     "fit": _of_lab("identify", "4/free_swing.toml", "report.html"),
     "regulate": _of_lab("regulate", "1b/fit.json", "report.html"),
     "design": design,
+    "track": _of_lab("track", "3/fit.json", "track.html"),
+    "swing-up": _of_lab("swing_up", "1b/fit.json", "swing_up.html"),
+    "ladder": _of_lab("ladder", "4/level_model.toml", "ladder.html"),
+    "law": _of_lab(
+        "law", "2/regulation_set_1.csv", "law-regulation_set_1.html", command="u", measured=("psi", "theta")
+    ),
+    "compare": compare,
+    "log": _answer("show", "4/release_60.csv"),
     "play": play,
     "doctor": _answer("doctor", "2b/swing_up.csv"),
     "survey": _answer("survey", "examples/survey/synthetic_wide.csv"),

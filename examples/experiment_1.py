@@ -3,14 +3,14 @@
     python examples/experiment_1.py 1
 
 The number is the seed: which rig of the make, 0 when left out. The picture of the weighing goes to experiment_1a.png,
-that of the sweep to experiment_1b.png.
+the Bode plot of the pendulum to experiment_1b.svg.
 """
 
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from upright.experiments.frequency_1b.figures import bode_figure
+from upright.experiments.frequency_1b.figures import bode_charts
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.weighing_1a.figures import line_figure
@@ -39,5 +39,5 @@ for name, found in answer.fit.estimates.items():
 pole = rig.plant.linear("inverted").poles()[0].real
 print(f"    The pole by the simplex on dB: {answer.simplex_pole.real:.3f} 1/s; truth {pole:.3f} 1/s")
 
-bode = bode_figure(answer.data, answer, fine=curves(answer))
-print("Pictures:", save(line_figure(line, "kg m^2"), Path("experiment_1a.png")), save(bode, Path("experiment_1b.png")))
+*_, bode = bode_charts(answer.data, answer, fine=curves(answer))
+print("Pictures:", save(line_figure(line, "kg m^2"), Path("experiment_1a.png")), bode.save(Path("experiment_1b.svg")))

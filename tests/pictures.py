@@ -7,12 +7,18 @@ from itertools import combinations
 from matplotlib.axis import Tick
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
+from matplotlib.textpath import TextPath
+
+from tests.report.interactive.drawn import drawings
+from upright.report.interactive.charts import Chart
 
 PIXEL = 1.0
 
 
 def unreadable(drawing) -> list[str]:
     """Texts that the edge cuts off, and those outside of the frames that lie on one another."""
+    if isinstance(drawing, Chart):
+        return [text for svg in drawings(drawing.svg("a")).values() for text in _unreadable_in(svg)]
     FigureCanvasAgg(drawing).draw()
     width, height = drawing.bbox.width, drawing.bbox.height
     texts = [text for text in drawing.findobj(Text) if text.get_visible() and text.get_text().strip()]
@@ -48,4 +54,18 @@ def _tick_labels(ax) -> list[Text]:
         for i, (axis, ends) in enumerate(((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())))
         for label in axis.get_ticklabels(which="both")
         if min(ends) <= label.get_position()[i] <= max(ends)
+    ]
+
+
+def _unreadable_in(svg) -> list[str]:
+    """The same of a chart's drawing, in the widest letters that it is shown with."""
+    wide = float(svg.get("viewBox").split()[2])
+    boxes: list[tuple[str, float, float, float]] = []
+    for text in svg.iter("text"):
+        long = TextPath((0, 0), text.text, size=float(svg.get("font-size"))).get_extents().width
+        left = float(text.get("x")) - long * {"start": 0.0, "middle": 0.5, "end": 1.0}[text.get("text-anchor", "start")]
+        boxes.append((text.text, left, left + long, float(text.get("y"))))
+    cut = [f"cut off: {text}" for text, left, right, _ in boxes if left < -PIXEL or right > wide + PIXEL]
+    return cut + [
+        f"{a[0]} on {b[0]}" for a, b in combinations(boxes, 2) if a[1] < b[2] and b[1] < a[2] and abs(a[3] - b[3]) < 10
     ]

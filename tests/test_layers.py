@@ -45,7 +45,7 @@ control
 rigs
 realtime
 report
-report.rig
+report.rig report.planes
 report.fit
 report.ladder report.law report.log
 report.run

@@ -162,7 +162,7 @@ def _body(asked: str, lines: Sequence[Line], passed: Mapping[str, str]) -> list[
     shares = [line for line in lines if line.contender.endswith(NOT)]
     listed = [line for line in lines if not line.contender.endswith(NOT)]
     return [
-        asked, "", "| room | noticed |", "|---|---|",
+        "", asked, "", "| room | noticed |", "|---|---|",
         *(f"| {line.contender.removesuffix(NOT)} | {line.note} |" for line in shares),
         "", "Not noticed by a quick test:", "", *(f"- `{line.contender}` `{line.note}`" for line in listed),
         "", "Not noticed, and judged not to matter:", "", *(f"- `{change}`: {why}" for change, why in passed.items()),

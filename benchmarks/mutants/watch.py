@@ -19,7 +19,8 @@ import pytest
 REPORT, LINES, WANTED, SECONDS = "MUTANTS_REPORT", "MUTANTS_LINES", "MUTANTS_WANTED", "MUTANTS_SECONDS"
 """File of the outcomes; folder of the lines that ran; file of the tests wanted, in order; limit of the whole [s]."""
 MEMORY = 8 * 2**30
-"""Bytes that a changed program may ask for: a loop without an end fills the memory before its time is over."""
+"""Bytes that a changed program may fill: a loop without an end fills the memory before its time is over. Address space
+alone is not counted, of which engines of WebAssembly reserve more."""
 HANG, SLOWER = 30.0, 20.0
 """A test hangs after so many seconds of CPU and so many times its usual time: its code may have to be compiled."""
 LONG, AGAIN = 90.0, 3.0
@@ -137,7 +138,7 @@ def _limit_memory() -> None:
         import resource
     except ImportError:  # Windows
         return
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 
 def _end_after(seconds: float) -> None:

@@ -3,7 +3,9 @@
 Everyone gets the same samples, the same model, the same known numbers and the same guesses, and is used as its authors
 advise; the scripts stand beside this one, in `benchmarks/peers`. A run that was held out is predicted with the physics
 frozen and its start refitted, freely from its first sample; a tail from the start of what was fitted, refitted to what
-comes before the samples that count. Extra `peers`: `pip install '.[peers]'`.
+comes before the samples that count. Extra `peers`: `pip install '.[peers]'`. opty is missing: it
+needs ipopt, whose Python interface (cyipopt) has no wheel on the index that we install from. No public log of a
+cart-pendulum or a Furuta pendulum is among the tasks yet.
 """
 
 from __future__ import annotations

@@ -16,13 +16,13 @@ M_P, L_CG, R, G = 0.135, 0.19, 0.16, 9.81
 
 
 @njit(cache=True)
-def _pendulum(x, p, mgl):
+def _pendulum(x: Array, p: Array, mgl: float) -> Array:
     fall = -mgl * math.sin(x[0]) - p[1] * x[1] - p[2] * math.tanh(x[1] / 0.01) - p[3] * x[1] * abs(x[1])
     return np.array([x[1], fall / p[0]])
 
 
 @njit(cache=True)
-def pendulum(p, start, mgl, count, dt, steps):
+def pendulum(p: Array, start: Array, mgl: float, count: int, dt: float, steps: int) -> Array:
     """Angle (count, 1) of a pendulum on a fixed pivot; `p` is J_A, b_2, b_2c, b_2q."""
     y, x, h = np.empty((count, 1)), start.copy(), dt / steps
     for i in range(count):
@@ -36,7 +36,7 @@ def pendulum(p, start, mgl, count, dt, steps):
 
 
 @njit(cache=True)
-def _furuta(x, p, u, rounded, stribeck):
+def _furuta(x: Array, p: Array, u: float, rounded: float, stribeck: float) -> Array:
     J_d, J_p, b_1, b_1c, b_2, b_2c, gain = p
     w1, w2, s, c = x[2], x[3], math.sin(x[1]), math.cos(x[1])
     J_A = J_p + M_P * L_CG**2
@@ -50,7 +50,7 @@ def _furuta(x, p, u, rounded, stribeck):
 
 
 @njit(cache=True)
-def furuta(p, angles, u, dt, steps, rounded, stribeck):
+def furuta(p: Array, angles: Array, u: Array, dt: float, steps: int, rounded: float, stribeck: float) -> Array:
     """Angles (N, 2) of a Furuta pendulum at rest at `angles`; `p` is J_d, J_p, b_1, b_1c, b_2, b_2c, gain."""
     y, h = np.empty((u.size, 2)), dt / steps
     x = np.array([angles[0], angles[1], 0.0, 0.0])

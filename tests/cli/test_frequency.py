@@ -26,7 +26,7 @@ def test_a_twin_is_swept_and_its_log_tells_the_same(tmp_path, monkeypatch):
     assert first.exit_code == 0, first.stderr
     assert "truth" in first.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 3  # the rig, the response and the sweep
+    assert page.count('class="still"') == 4  # the rig, the response of either coordinate and the sweep
     shown = next(
         line for line in first.stdout.splitlines() if line.strip().startswith("upright frequency out/sweep.csv")
     )

@@ -33,7 +33,7 @@ def logs(tmp_path_factory) -> Path:
 def test_the_twin_is_weighed_and_its_logs_tell_the_same(tmp_path, monkeypatch):
     outcome = upright("loadings", "--twin", "rectilinear", "--seed", 4, "-o", tmp_path / "out")
     assert outcome.exit_code == 0, outcome.stderr
-    assert "truth" in outcome.stdout
+    assert "true value of the twin" in outcome.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 3
     assert "http://" not in page.replace("http://www.w3.org", "")

@@ -211,7 +211,7 @@ def test_a_study_is_read_for_the_run_that_the_log_is(tmp_path):
 
 def test_a_rig_is_known_by_its_plant_s_name_and_by_nothing_else():
     assert read_known("furuta") == (Furuta, Wiring())
-    with pytest.raises(BadInput, match="it may be a plant's name, a study"):
+    with pytest.raises(BadInput, match="A rig is a plant's name, a study"):
         read_known("no-such-rig")
 
 

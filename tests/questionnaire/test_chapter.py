@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -163,6 +164,13 @@ def test_agreement_is_that_of_the_two_first_answers():
     bars = picture(page, "agreement").draw().axes[0].patches
     assert [b.get_x() for b in bars] == pytest.approx([0, 10, 70, 90, 100])
     assert [b.get_width() for b in bars] == pytest.approx([10, 60, 20, 10, 0])
+
+
+def test_one_answer_alone_is_a_hundred_percent():
+    page = told(ratings(likert=(replace(AGREE, counts=(0, 1, 0, 0, 0)),)))
+    assert picture(page, "agreement").description == (
+        "it helped: 0 % strongly agree, 100 % agree, 0 % neutral, 0 % disagree, 0 % strongly disagree"
+    )
 
 
 def test_bars_of_agreement_lie_end_to_end_and_shares_from_seven_percent_are_written_in():

@@ -31,7 +31,8 @@ def test_matrices_of_ssdata_are_a_continuous_model(tmp_path):
 
 def test_a_structure_keeps_period_and_names(tmp_path):
     fields = {"A": A, "B": B, "C": C, "D": D, "Ts": 2e-3, "StateName": np.array(["theta", "theta_dot"], dtype=object)}
-    path = saved(tmp_path / "m.mat", rig=fields | {"InputName": np.array(["v"], dtype=object)}, other=1.0)
+    rig, notes = fields | {"InputName": np.array(["v"], dtype=object)}, {"by": "somebody", "D": D}
+    path = saved(tmp_path / "m.mat", rig=rig, other=1.0, notes=notes)
     model = up.from_matlab(path)
     assert model.dt == 2e-3
     assert tuple(model.states) == ("theta", "theta_dot")

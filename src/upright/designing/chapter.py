@@ -11,11 +11,14 @@ import numpy as np
 from upright.basis import in_percent
 from upright.control.effort import shown
 from upright.designing.run import Designed, Holding, VelocityLoop
+from upright.gains.loop import response
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
-from upright.report.drawing import BLACK, BLUE, VERMILLION, Poles, locus_figure, pole_map, swing_figure
+from upright.records import Array
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
+from upright.report.planes import Poles, locus_chart, loop_chart, pole_chart
 from upright.report.rig import rig_drawing, rig_table
 from upright.report.symbols import number, plain
 from upright.report.symbols import unit as raised
@@ -62,7 +65,7 @@ def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = "."
         parts=(
             Part("Gains", (Points(tuple(gains)), _gain_table(design), _pole_table(design))),
             Part("Poles", (*sure, *_pole_pictures(design))),
-            Part("The loop as it runs", (loop, _way_table(design))),
+            Part("The loop as it runs", (loop, *_loop_picture(design), _way_table(design))),
             Part("Coming back", (_swing_picture(design),)),
             *((Part("The rig", (rig_table(design.request.on),)),) if design.request.on else ()),
         ),
@@ -321,39 +324,75 @@ def _pole_pictures(design: Designed) -> list[Picture]:
     """Poles in the s-plane, and the LQR locus as the effort's weight varies, a hundredfold either way."""
     aim = "requested" if design.placement else "LQR"
     kinds = [
-        Poles(name="model, open loop", values=_drawn(design, design.open_loop), mark="x", colour=BLACK),
-        Poles(name=aim, values=_drawn(design, design.wanted), mark="o", colour=BLUE),
-        Poles(name="loop as it runs", values=_drawn(design, design.poles), mark="+", colour=VERMILLION),
+        Poles(name="model, open loop", values=_drawn(design, design.open_loop), mark="x"),
+        Poles(name=aim, values=_drawn(design, design.wanted), mark="o", colour="q0"),
+        Poles(name="loop as it runs", values=_drawn(design, design.poles), mark="+", colour="q1"),
     ]
+    drawn = pole_chart(kinds, design.cloud, cloud_of="loop, rigs that the fit allows")
     pictures = [
-        Picture(
-            name="poles", draw=lambda: pole_map(kinds, design.cloud),
-            caption="Poles in the s-plane; those of the loop as it runs are s = ln(z)/T of its sampled poles.",
+        drawn.picture(
+            "poles",
+            caption="Poles in the upper half of the s-plane; those of the loop as it runs are s = ln(z)/T of its "
+            "sampled poles. Tinted: unstable.",
             description="; ".join(f"{k.name}: {written(k.values, 4)}" for k in kinds),
         )
-    ]  # fmt: skip
+    ]
     if design.R is None:
         return pictures
     weights = design.request.weights or (1.0,) * design.model.A.shape[0]
     discrete = design.model.dt is not None
-    tracks = locus(design.model.A, design.model.B, weights, design.R * np.geomspace(100, 0.01, 300), sampled=discrete)
+    cheaper = design.R * np.geomspace(100, 0.01, 300)
+    tracks = locus(design.model.A, design.model.B, weights, cheaper, sampled=discrete)
     tracks = to_s(tracks, design.request.period) if discrete else tracks
-    cheaper = Picture(
-        name="locus",
-        draw=lambda: locus_figure(tracks, {"chosen": _drawn(design, design.wanted)}, _drawn(design, design.open_loop)),
-        caption="LQR poles as the effort gets cheaper, from a hundred times the weight chosen to a "
-        "hundredth.",
+    chosen = {"chosen": _drawn(design, design.wanted)}
+    cheaper_effort = locus_chart(
+        tracks, cheaper, chosen, _drawn(design, design.open_loop), of="LQR poles as effort gets cheaper", symbol="R"
+    )
+    locus_of = cheaper_effort.picture(
+        "locus",
+        caption="LQR poles as the effort gets cheaper, from a hundred times the weight chosen to a hundredth.",
         description=f"Chosen: R = {number(design.R)}, poles {written(design.wanted, 4)}.",
-    )  # fmt: skip
-    return [*pictures, cheaper]
+    )
+    return [*pictures, locus_of]
+
+
+def _loop_picture(design: Designed) -> list[Picture]:
+    """The loop gain with its margins; nothing where the loop falls."""
+    m = design.chosen.margins
+    if m is None:
+        return []
+    drawn = loop_chart(response(design.sampled, design.law), m, design.sampled.period)
+    return [
+        drawn.picture(
+            "loop",
+            caption="Bode plot of the loop gain, cut at the command. Dashed in the phase: where the gain is 1, with "
+            "the phase margin. Dashed in the magnitude: where the phase is ±180°, with the factor on the command that "
+            "the loop bears.",
+            description=f"Phase margin {number(math.degrees(m.phase), 3)} deg; stable for factors on the command "
+            f"from {number(m.least_gain, 2)} to {number(m.most_gain, 3)}.",
+        )
+    ]
 
 
 def _swing_picture(design: Designed) -> Picture:
     t, y, u = design.swing
-    units = zip(design.rig.outputs, design.rig.output_units, strict=True)
-    shown = {name: (y[:, i], unit) for i, (name, unit) in enumerate(units)}
-    return Picture(
-        name="swing", draw=lambda: swing_figure(t, shown, u[:, 0], design.rig.unit, design.request.limit),
+    limit = design.request.limit
+    reach = 1.25 * max(limit or 0.0, float(np.abs(u).max()))
+    panels = [
+        _over(t, y[:, i], plain(name), unit, f"q{i % 4}")
+        for i, (name, unit) in enumerate(zip(design.rig.outputs, design.rig.output_units, strict=True))
+    ]
+    command = replace(
+        _over(t, u[:, 0], "command", design.rig.unit, "effort"),
+        limits=None if limit is None else (-reach, reach),
+        levels=() if limit is None else ((limit, "limit"), (-limit, "")),
+    )
+    return Chart(x="time", unit="s", panels=(*panels, command)).picture(
+        "swing",
         caption="Linear model, continuous gains: the way back from the requested start, and the command it takes.",
         description=f"The command peaks at {design.peak:.3g} {design.rig.unit}.",
-    )  # fmt: skip
+    )
+
+
+def _over(t: Array, values: Array, title: str, unit: str, colour: str) -> ChartPanel:
+    return ChartPanel(title=title, unit=unit, height=100.0, lines=(ChartLine(name="", x=t, y=values, colour=colour),))

@@ -195,7 +195,7 @@ def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
         return find(text), Wiring()
     except BadInput as error:
         raise BadInput(
-            f"--rig {text}: {error}; it may be a plant's name, a study (TOML) or the fit.json of `upright identify`"
+            f"--rig {text}: {error} A rig is a plant's name, a study (TOML), a fit.json or an MJCF file."
         ) from None
 
 
@@ -242,8 +242,8 @@ def case_of(record: Record, inspection: Inspection, rig: Rig | type[Plant] | Non
     u, drive = np.zeros(record.t.size), ""
     if wiring.drive is not None:
         u = wiring.drive.read(record)
-        plain = wiring.drive.what.strip("`")
-        drive = plain if plain in record.signals else wiring.drive.what
+        stated = wiring.drive.what or ""
+        drive = stated.strip("`") if stated.strip("`") in record.signals else stated
     return Case(
         record=record, inspection=inspection, plant=plant, rig=rig if isinstance(rig, Rig) else None,
         places=places, zeroed=True, drive=drive, u=u, moduli=moduli, locked=wiring.locked,

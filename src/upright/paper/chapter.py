@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from upright.gains.factorization import Locus
-from upright.gains.requests import matched, written
+from upright.gains.requests import written
 from upright.paper.reproduce import STUDENTS, Regenerated, Reproduced
-from upright.report.drawing import BLACK, BLUE, GREY, VERMILLION, Poles, figure, locus_figure, pole_map, styled
+from upright.report.drawing import BLUE, GREY, VERMILLION, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
+from upright.report.planes import Poles, locus_chart, pole_chart
 from upright.report.symbols import number
 
 if TYPE_CHECKING:
@@ -103,32 +104,32 @@ def _polynomial(locus: Locus) -> str:
 
 
 def _locus_picture(table: Regenerated, name: str) -> Picture:
-    def draw() -> Any:
-        rows = [table.locus.poles(float(c)) for c in np.geomspace(1e-4, 64.0, 1500)]  # effort ever cheaper
-        for i in range(1, len(rows)):
-            rows[i] = matched(rows[i - 1], rows[i])
-        sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
-        open_loop = np.roots(table.locus.a).astype(np.complex128)
-        return locus_figure(np.array(rows), sets, open_loop, origin="open loop, recovered")
-
-    return Picture(
-        name=name, draw=draw,
+    efforts = np.geomspace(1e-4, 64.0, 400)
+    tracks = np.array([table.locus.poles(float(c)) for c in efforts])  # effort ever cheaper
+    sets = {f"printed, set {i + 1}": poles for i, poles in enumerate(table.printed)}
+    open_loop = np.roots(table.locus.a).astype(np.complex128)
+    drawn = locus_chart(
+        tracks, efforts, sets, open_loop, of="LQR poles as effort gets cheaper", symbol="1/R",
+        origin="open loop, recovered",
+    )  # fmt: skip
+    return drawn.picture(
+        name,
         caption=f"{table.name}. All four printed sets lie on the locus of one plant and one Q, with R halved from set "
         "to set.",
         description=f"Printed poles within {table.worst:.2f} roundings of the locus.",
-    )  # fmt: skip
+    )
 
 
 def chapter(result: Reproduced) -> Chapter:
     """The tables again, and the errata."""
     one, two, three = _facts(result)
     kinds = [
-        Poles(name="requested, Table 1, set 1", values=result.printed_poles, mark="o", colour=BLUE),
-        Poles(name="attained, eq. (2) as printed", values=result.missed, mark="x", colour=VERMILLION),
-        Poles(name="open loop", values=np.array([result.unstable[1]], dtype=np.complex128), mark="+", colour=BLACK),
+        Poles(name="requested, Table 1, set 1", values=result.printed_poles, mark="o", colour="q0"),
+        Poles(name="attained, eq. (2) as printed", values=result.missed, mark="x", colour="q1"),
+        Poles(name="open loop", values=np.array([result.unstable[1]], dtype=np.complex128), mark="+"),
     ]
-    missed = Picture(
-        name="missed", draw=lambda: pole_map(kinds, frame=3),
+    missed = pole_chart(kinds, frame=3).picture(
+        "missed",
         caption="Poles of the right model under gains that Ackermann's formula gives for eq. (2) as printed.",
         description=f"Attained: {written(result.missed, 4)}.",
     )  # fmt: skip

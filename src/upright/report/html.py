@@ -67,11 +67,17 @@ def _policy(text: str, chapters: Sequence[Chapter]) -> str:
 
 def fragment(page: Chapter) -> str:
     """A chapter as part of somebody else's page, a notebook's: headline, tables, and one picture; prose is left out."""
-    pictures = (b for p in page.parts if not p.aside for b in p.content if isinstance(b, Picture))
+    pictures = [b for p in page.parts if not p.aside for b in p.content if isinstance(b, Picture)]
+    best = page.picture if page.picture in pictures else next(iter(pictures), None)
     return _rendered(
-        "fragment.html", page=page, shown=("Table", "Points", "Facts", "Code"), picture=next(pictures, None),
+        "fragment.html", page=page, shown=("Table", "Points", "Facts", "Code"), picture=best,
         prefix=f"u{next(_FRAGMENTS)}-",
     )  # fmt: skip
+
+
+def picture_in_notebook(picture: Picture) -> str:
+    """One picture as part of somebody else's page, a notebook's, with what makes it answer."""
+    return _rendered("picture.html", picture=picture, prefix=f"u{next(_FRAGMENTS)}-", scripts=[picture.script])
 
 
 def rendered(package: str, template: str, **values: Any) -> str:

@@ -96,7 +96,7 @@ class Picture:
     name : str
         Unique in its chapter; ids inside the drawing begin with it.
     draw : callable or str
-        Gives the matplotlib figure, when somebody looks; or its markup.
+        Gives the matplotlib figure or the chart when somebody looks; or its markup.
     interactive : callable or str
         Gives what a page on a screen draws in its place, from `report.interactive`; nothing when empty.
     """
@@ -117,18 +117,26 @@ class Picture:
         """The script that draws it, which stands once in a page."""
         if not self.answers:
             return ""
-        from upright.report.interactive.script import script
+        from upright.report.interactive.script import cursor_script, script
 
-        return script()
+        return cursor_script() if self.kind == "chart" else script()
+
+    @property
+    def kind(self) -> str:
+        """Who takes what it answers with: ``chart`` or ``traces``."""
+        return "chart" if self.answers.startswith('{"chart"') else "traces"
 
     @cached_property
     def svg(self) -> str:
         """Markup of the drawing."""
         if isinstance(self.draw, str):
             return self.draw
+        drawn = self.draw()
+        if self.kind == "chart":
+            return drawn.svg(self.name)
         from upright.report.drawing import svg
 
-        return svg(self.draw(), self.name)
+        return svg(drawn, self.name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -17,6 +17,7 @@ from upright.report.symbols import symbol
 
 _ROOT = '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
 _PROPERTY = re.compile(r"var\(--[\w-]+, ([^)]*)\)")
+_FIRST = re.compile(r"<svg.*?</svg>", re.DOTALL)
 _SHARE = re.compile(r'\sstyle="max-width:(\d+)%"')
 
 
@@ -46,11 +47,10 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
         """Pictures as files beside the template, formulas as trees of MathML's elements, states with their tone."""
         if isinstance(value, Picture):
             name = f"figure-{len(files)}.svg"
-            share = _SHARE.search(value.svg)
-            markup = _PROPERTY.sub(r"\1", _SHARE.sub("", value.svg))
-            files[name] = markup.replace("<svg", _ROOT, 1).encode()
+            drawn, share = standalone(value.svg)
+            files[name] = drawn.encode()
             plain = {"caption": value.caption, "description": value.description, "file": name}
-            return {"kind": "Picture", **plain, "share": int(share[1]) if share else 100}
+            return {"kind": "Picture", **plain, "share": share}
         if isinstance(value, Formula):
             return {"kind": "Formula", "tree": _tree(ElementTree.fromstring(value.markup))}
         if isinstance(value, Symbol):
@@ -72,6 +72,14 @@ def write_pdf(path: Path, page: Chapter | Book) -> Path:
     fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     to_pdf: Any = typst.compile  # its stub knows no files by name
     return replace_file(path, to_pdf(files, font_paths=[str(fonts)], ignore_system_fonts=True))
+
+
+def standalone(markup: str) -> tuple[str, int]:
+    """A picture's drawing, of a chart that for a desk, as a file of its own, and the share [%] of a column it takes."""
+    first = _FIRST.search(markup)
+    drawn = first[0] if first else markup
+    share = _SHARE.search(drawn)
+    return _PROPERTY.sub(r"\1", _SHARE.sub("", drawn)).replace("<svg", _ROOT, 1), int(share[1]) if share else 100
 
 
 def _tree(node: ElementTree.Element) -> dict[str, Any]:

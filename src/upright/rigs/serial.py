@@ -427,6 +427,7 @@ def _down(value: float) -> int:
 
 def _open(to: Connection) -> SerialRig:
     about, rest = to.capabilities()
+    assert to.port is not None  # the driver needs it, so RIG.toml has been refused without
     return SerialRig(
         to.port, coordinates=about.coordinates, counts=about.counts, command_unit=about.command_unit,
         full_scale=about.full_scale, **rest,

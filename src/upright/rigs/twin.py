@@ -175,7 +175,8 @@ class TwinPort:
 
 
 def _open(to: Connection) -> Board:
-    return Board(TwinPort(_wired(to.truth, to.board), to.zero if to.zero in to.model.plant.equilibria else ""))
+    zero = to.zero if to.zero is not None and to.zero in to.model.plant.equilibria else ""
+    return Board(TwinPort(_wired(to.truth, to.board), zero))
 
 
 def _wired(rig: Rig, board: Mapping[str, Any]) -> Rig:

@@ -63,7 +63,7 @@ class Answer(Generic[V]):
         return tuple(self._drawings())
 
     def plot(self, name: str | None = None) -> Any:
-        """Matplotlib figure of the chapter's first picture, or of the one called `name`; its SVG where a run was kept.
+        """The chapter's best picture, or the one called `name`: a matplotlib figure or a chart; SVG of a stored one.
 
         Raises
         ------
@@ -73,7 +73,7 @@ class Answer(Generic[V]):
         drawings = self._drawings()
         if not drawings:
             raise BadInput(f"there is no picture of '{self.chapter.title}'; print it, or look into .numbers.")
-        name = name or next(iter(drawings))
+        name = name or self.chapter.best or next(iter(drawings))
         if name not in drawings:
             raise BadInput(f"plot draws {', '.join(drawings)}, got '{name}'; {nearest(name, drawings)}")
         draw = drawings[name].draw
@@ -106,7 +106,8 @@ class StoredPicture(str):
     """SVG of a picture that an earlier run drew; a notebook shows it."""
 
     def _repr_svg_(self) -> str:
-        return str(self)
+        first, end, _ = self.removeprefix('<div class="chart">').partition("</svg>")  # of a chart that for a desk
+        return first + end
 
 
 def as_text(chapter: Chapter, files: Sequence[Path] = ()) -> str:

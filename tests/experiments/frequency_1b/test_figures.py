@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from upright.experiments.frequency_1b.chapter import log_chapter
-from upright.experiments.frequency_1b.figures import bode_figure, quality_figure
+from upright.experiments.frequency_1b.figures import bode_charts, quality_chart
 from upright.experiments.frequency_1b.run import LoggedResponse
 from upright.identification.frequency.response import FrequencyResponse
 
@@ -25,86 +25,61 @@ DATA = FrequencyResponse(
 )  # fmt: skip
 
 
-def points(ax):
-    (bars,) = ax.containers
-    dots, _, (lines,) = bars.lines
-    half = np.array([np.ptp(segment[:, 1]) / 2 for segment in lines.get_segments()])
-    return dots.get_xydata(), half
-
-
-def test_magnitude_and_phase_stand_with_their_95_percent_bars():
+def test_magnitude_phase_and_coherence_stand_with_their_95_percent_bars():
     """20 log10 of the magnitude; of an error of 2 % the bars are 1.96 * 20/ln 10 * 0.02 dB and 1.96 * 0.02 rad."""
-    axes = np.reshape(np.array(bode_figure(DATA).axes), (2, 2))
     # the error's mean square is of real and imaginary part together
     error = DATA.error
-    for j, name in enumerate(("x", "θ")):
-        xy, half = points(axes[0, j])
-        np.testing.assert_allclose(xy, np.column_stack([OMEGA, 20 * np.log10(np.abs(RESPONSE[:, j]))]))
-        np.testing.assert_allclose(half, 1.96 * 20 / math.log(10) * error[:, j])
-        xy, half = points(axes[1, j])
-        expected = np.degrees(np.unwrap(np.angle(RESPONSE[:, j])))
-        turns = (xy[:, 1] - expected) / 360
+    for j, (name, chart) in enumerate(zip(("x", "θ"), bode_charts(DATA), strict=True)):
+        assert (chart.label, chart.logarithmic) == ("frequency [rad/s]", True)
+        magnitude, phase, coherence = chart.panels
+        (shown,) = magnitude.lines
+        np.testing.assert_array_equal(shown.x, OMEGA)
+        np.testing.assert_allclose(shown.y, 20 * np.log10(np.abs(RESPONSE[:, j])))
+        low, high = shown.bars
+        np.testing.assert_allclose((high - low) / 2, 1.96 * 20 / math.log(10) * error[:, j])
+        (shown,) = phase.lines
+        turns = (shown.y - np.degrees(np.unwrap(np.angle(RESPONSE[:, j])))) / 360
         np.testing.assert_allclose(turns, round(turns[0]), atol=1e-9)  # whole turns are free
-        np.testing.assert_allclose(half, np.degrees(1.96 * error[:, j]))
-        assert axes[0, j].get_title(loc="left") == f"{name} / u"
-        assert axes[1, j].get_xlabel() == "frequency [rad/s]"
-        assert axes[1, j].get_xscale() == "log"
-    assert axes[0, 0].get_ylabel() == "magnitude [dB re 1 m/V]"
-    assert axes[1, 0].get_ylabel() == "phase [deg]"
-    assert axes[0, 1].get_ylabel() == ""
+        low, high = shown.bars
+        np.testing.assert_allclose((high - low) / 2, np.degrees(1.96 * error[:, j]))
+        np.testing.assert_array_equal(coherence.lines[0].y, COHERENCE[:, j])
+        assert [p.title for p in chart.panels] == [f"{name} / u, magnitude", f"{name} / u, phase", "coherence"]
+        assert [p.unit for p in chart.panels] == [f"dB re 1 {('m', 'rad')[j]}/V", "deg", ""]
 
 
 def test_a_model_is_drawn_within_half_a_turn_of_the_points_it_explains():
     w = np.geomspace(1, 20, 200)
     model = 8.0 / (1j * w + 4.0)
     both = np.column_stack([model, model / (1j * w) ** 2])
-    axes = np.reshape(np.array(bode_figure(DATA, fine=[(w, both)]).axes), (2, 2))
-    for j in range(2):
-        curve = max(axes[1, j].get_lines(), key=lambda line: len(line.get_xdata()))
-        shown, _ = points(axes[1, j])
-        np.testing.assert_allclose(np.interp(np.log(OMEGA), np.log(w), curve.get_ydata()), shown[:, 1], atol=0.1)
-        high = max(axes[0, j].get_lines(), key=lambda line: len(line.get_xdata()))
-        np.testing.assert_allclose(high.get_ydata(), 20 * np.log10(np.abs(both[:, j])))
+    for j, chart in enumerate(bode_charts(DATA, fine=[(w, both)])):
+        magnitude, phase, _ = chart.panels
+        points, curve = phase.lines
+        np.testing.assert_allclose(np.interp(np.log(OMEGA), np.log(w), curve.y), points.y, atol=0.1)
+        np.testing.assert_allclose(magnitude.lines[1].y, 20 * np.log10(np.abs(both[:, j])))
+        assert curve.name == "least squares"
 
 
-def test_frequencies_are_marked_at_one_two_and_five_of_each_decade():
-    axes = bode_figure(DATA).axes
-    assert axes[-1].xaxis.get_major_locator()().tolist() == [1.0, 2.0, 5.0, 10.0, 20.0]
-    said = axes[-1].xaxis.get_major_formatter()
-    assert [said(v) for v in (0.5, 1.0, 20.0)] == ["0.5", "1", "20"]
-
-
-def test_each_quality_has_a_panel_of_whole_decades():
+def test_each_quality_has_a_panel_of_its_own():
     """1 - coherence, harmonics, error in percent, amplitude |H| |u| with |3 + 4j| = 5 V beside it."""
-    incoherent, harmonics, errors, amplitude = quality_figure(DATA).axes
-    for ax, values in (
-        (incoherent, np.maximum(1 - COHERENCE, 1e-9)), (harmonics, DATA.distortion), (errors, 100 * DATA.error),
-        (amplitude, 5.0 * np.abs(RESPONSE)),
-    ):  # fmt: skip
-        for j, line in enumerate(ax.get_lines()[:2]):
-            np.testing.assert_allclose(line.get_xydata(), np.column_stack([OMEGA, values[:, j]]))
-        low, high = np.log10(ax.get_ylim())
-        shown = np.concatenate([line.get_ydata() for line in ax.get_lines()])
-        assert (low, high) == (pytest.approx(round(low)), pytest.approx(round(high)))
-        assert low <= np.log10(shown.min()) < low + 1
-        assert high >= low + 1
-        assert high - 1 <= max(np.log10(shown.max()), low)
-    command = amplitude.get_lines()[2]
-    np.testing.assert_allclose(command.get_ydata(), 5.0)
-    assert [t.get_text() for t in amplitude.get_legend().get_texts()] == ["x [m]", "θ [rad]", "command [V]"]
-    assert [t.get_text() for t in incoherent.get_legend().get_texts()] == ["x", "θ"]
-    marks = [line.get_marker() for line in incoherent.get_lines()]
-    assert len(set(marks)) == 2
-    assert amplitude.get_xlabel() == "frequency [rad/s]"
+    panels = quality_chart(DATA).panels
+    expected = (np.maximum(1 - COHERENCE, 1e-9), DATA.distortion, 100 * DATA.error, 5.0 * np.abs(RESPONSE))
+    assert [p.title for p in panels] == ["1 − coherence", "harmonics over fundamental", "standard error", "amplitude"]
+    for panel, values in zip(panels, expected, strict=True):
+        assert panel.logarithmic
+        for j, line in enumerate(panel.lines[:2]):
+            np.testing.assert_allclose(line.y, values[:, j])
+            np.testing.assert_array_equal(line.x, OMEGA)
+    command = panels[-1].lines[2]
+    np.testing.assert_allclose(command.y, 5.0)
+    assert [line.name for line in panels[-1].lines] == ["x [m]", "θ [rad]", "command [V]"]
+    assert len({line.mark for line in panels[-1].lines}) == 3
 
 
-def test_what_nobody_measured_is_said_and_not_drawn():
+def test_what_nobody_measured_is_not_drawn():
     bare = FrequencyResponse(omega=OMEGA, response=RESPONSE, outputs=("x", "theta"), drive=np.full(5, 1.0 + 0j))
-    harmonics = quality_figure(bare).axes[1]
-    assert [t.get_text() for t in harmonics.texts] == ["not measured by a sweep"]
-    assert not len(harmonics.get_yticks())
-    amplitude = quality_figure(bare).axes[3]
-    assert [t.get_text() for t in amplitude.get_legend().get_texts()] == ["x", "θ", "command"]  # no units, no brackets
+    panels = quality_chart(bare).panels
+    assert "harmonics over fundamental" not in [p.title for p in panels]
+    assert [line.name for line in panels[-1].lines] == ["x", "θ", "command"]  # no units, no brackets
 
 
 def test_a_response_without_a_fit_says_where_it_follows_the_command_and_how_well():
@@ -118,7 +93,7 @@ def test_a_response_without_a_fit_says_where_it_follows_the_command_and_how_well
     assert told.parts[0].content[:2] == ("5 frequencies from 1 to 20 rad/s in a.csv, b.csv.", "A note.")
     quality = told.parts[0].content[2]
     assert quality.description == "Least coherence 0.3, largest distortion 0.05."
-    _, table = told.parts[1].content
+    *_, table = told.parts[1].content
     assert len(table.rows) == 10
     assert table.rows[5] == ("theta", "1.000", f"{20 * math.log10(8 / math.sqrt(17)):.3f}", "166.0", percent, "0.9900")
     assert table.numbers == (1, 2, 3, 4, 5)

@@ -12,7 +12,7 @@ import pytest
 
 from upright.errors import NotIdentifiable
 from upright.experiments.frequency_1b.chapter import chapter, true_key
-from upright.experiments.frequency_1b.figures import bode_figure
+from upright.experiments.frequency_1b.figures import bode_charts
 from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
 from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, _probed, broadband, collect, grid, sines, stepped_sine
 from upright.experiments.stand.known import bench, model_of
@@ -251,27 +251,15 @@ def test_what_was_asked_counts_the_sines_that_did_not_settle(done):
     assert told((np.nan,) * 3).content[1] == "Not settled."
 
 
-def test_what_the_fits_leave_is_drawn_on_decades_of_both_signs(done):
-    """Linear within 0.1: a tick at zero and, as far as the axis goes, at 0.1, 1, 10 and 100 above and below it."""
-    drawing = bode_figure(done.answer.data, done.answer)
-    lowest = drawing.axes[-4:]
-    assert [axes.get_ylabel() for axes in lowest] == ["magnitude\nleft [%]", "", "phase\nleft [deg]", ""]
-    for axes in lowest:
-        low, high = axes.get_ylim()
-        assert high == -low > 0.1
-        decades = [v for v in (0.1, 1.0, 10.0, 100.0) if v <= high]
-        assert axes.get_yticks().tolist() == [*(-v for v in reversed(decades)), 0.0, *decades]
-        left = np.concatenate([line.get_ydata() for line in axes.get_lines() if len(line.get_ydata()) == 8])
-        assert np.abs(left).max() < high
-    assert lowest[0].get_xlabel() == ""
-    assert lowest[-1].get_xlabel() == "frequency [rad/s]"
-    # the measured over the model's, by the first of the two fits
-    j, answer = 0, done.answer
-    ratio = np.log(answer.used.response[:, j] / answer.simplex.model[:, j])
-    squares = next(line for line in lowest[0].get_lines() if line.get_marker() == "s")
-    np.testing.assert_allclose(squares.get_ydata(), 100 * ratio.real)
-    squares = next(line for line in lowest[2].get_lines() if line.get_marker() == "s")
-    np.testing.assert_allclose(squares.get_ydata(), np.degrees(ratio.imag))
+def test_how_far_each_fit_misses_the_points_is_drawn_in_percent(done):
+    answer = done.answer
+    for j, chart in enumerate(bode_charts(answer.data, answer)):
+        *_, missed = chart.panels
+        assert (missed.title, missed.unit, missed.logarithmic) == ("distance from each fit", "%", True)
+        for line, model in zip(missed.lines, (answer.squares.way.model, answer.simplex.model), strict=True):
+            np.testing.assert_array_equal(line.x, answer.used.omega)
+            np.testing.assert_allclose(line.y, 100 * np.abs((answer.used.response - model) / model)[:, j])
+        assert [line.name for line in missed.lines] == ["least squares", "simplex on dB"]
 
 
 @pytest.fixture(scope="module")

@@ -264,17 +264,18 @@ def test_pictures_of_the_reasons_are_of_the_fitted_model():
     told = chapter(whole())
     pictures = {b.name: b for part in told.parts for b in part.content if hasattr(b, "draw")}
     assert set(pictures) == {"track-poles", "track-steps", "track-compared", "track-bargain", "track-loci"}
-    (near, far) = pictures["track-loci"].draw().axes
+    (near, far) = pictures["track-loci"].draw().panels
     swing = math.sqrt(RIG.plant.k_12 / RIG.plant.J_2)
     for ax, zeros in ((near, [(-20.0, 0.0), (0.0, swing)]), (far, [(-20.0, 0.0)])):  # kp/kd = 8/0.4
-        (drawn,) = [line for line in ax.get_lines() if line.get_label() == "zero"]
-        np.testing.assert_allclose(sorted(drawn.get_xydata().tolist()), sorted(zeros), atol=1e-9)
-        (marked,) = [line for line in ax.get_lines() if line.get_label() == "kp of the tuned PD"]
+        (drawn,) = [line for line in ax.lines if line.name == "zero"]
+        shown = sorted(zip(drawn.x.tolist(), drawn.y.tolist(), strict=True))
+        np.testing.assert_allclose(shown, sorted(zeros), atol=1e-9)
+        (marked,) = [line for line in ax.lines if line.name == "kp of the tuned PD"]
         K = np.array([[8.0, 0.4, 0, 0]]) if ax is near else np.array([[0, 0, 8.0, 0.4]])
         model = RIG.linear(AT)
         poles = np.linalg.eigvals(model.A - model.B @ K)
         poles = np.sort_complex(poles[poles.imag > -1e-9])
-        np.testing.assert_allclose(np.sort_complex(marked.get_xdata() + 1j * marked.get_ydata()), poles, rtol=1e-6)
+        np.testing.assert_allclose(np.sort_complex(marked.x + 1j * marked.y), poles, rtol=1e-6)
     (bargain,) = pictures["track-bargain"].draw().axes
     curve = next(line for line in bargain.get_lines() if line.get_label().startswith("PD, near"))
     np.testing.assert_allclose(curve.get_xdata()[[0, -1]], 0.65 * np.array([0.2 * 8.0, 2.5 * SET_4.k_pf]))

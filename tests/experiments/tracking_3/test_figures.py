@@ -24,16 +24,15 @@ from tests.experiments.tracking_3.closed_form import (
     tracking,
 )
 from upright.experiments.tracking_3.figures import (
-    RootLocus,
     Tradeoff,
     in_reading_unit,
-    loci_figure,
-    poles_figure,
+    poles_chart,
     steps_figure,
     tradeoff_figure,
 )
 from upright.experiments.tracking_3.laws import AT, loop_poles
 from upright.experiments.tracking_3.run import figured
+from upright.report.planes import RootLocus, loci_chart
 
 DEG = 180 / math.pi
 
@@ -158,7 +157,8 @@ def test_a_run_that_trips_ends_in_a_cross_within_the_picture():
 
 
 def points(line):
-    return np.sort_complex(np.asarray(line.get_xdata()) + 1j * np.asarray(line.get_ydata()))
+    seen = np.isfinite(line.y)
+    return np.sort_complex(line.x[seen] + 1j * line.y[seen])
 
 
 def upper(values):
@@ -168,24 +168,23 @@ def upper(values):
 def test_poles_are_those_of_rig_model_and_request_in_the_upper_half_plane():
     other = RIG.changed(k_12=1.5 * RIG.plant.k_12)
     done = tracking(outcome(SET_1), outcome(SET_4), outcome(SUM), rig=other)
-    drawing = poles_figure(done)
-    assert len(drawing.axes) == 4
-    assert [ax.get_visible() for ax in drawing.axes] == [True, True, True, False]
-    for ax, law in zip(drawing.axes, (SET_1, SET_4, SUM), strict=False):
-        by_name = {line.get_label(): line for line in ax.get_lines()}
+    drawing = poles_chart(done)
+    assert len(drawing.panels) == 3
+    left = 1.12 * SET_4.requested.real.min()
+    assert drawing.span == pytest.approx((left, -0.06 * left))
+    high = 1.2 * max(np.abs(p.imag).max() for p in (RIG.linear(AT).poles(), SET_1.requested, SET_4.requested))
+    for panel, law in zip(drawing.panels, (SET_1, SET_4, SUM), strict=True):
+        by_name = {line.name: line for line in panel.lines}
         np.testing.assert_allclose(points(by_name["open loop"]), upper(RIG.linear(AT).poles()), atol=1e-9)
         np.testing.assert_allclose(points(by_name["requested"]), upper(law.requested))
         np.testing.assert_allclose(points(by_name["on the fitted model, sampled and late"]), upper(law.poles))
         np.testing.assert_allclose(points(by_name["on the rig"]), upper(loop_poles(other, law.law)))
-        assert ax.get_xlim()[0] == pytest.approx(1.12 * SET_4.requested.real.min())
-        assert ax.get_xlim()[1] == pytest.approx(-0.06 * ax.get_xlim()[0])
-        high = 1.2 * max(np.abs(p.imag).max() for p in (RIG.linear(AT).poles(), SET_1.requested, SET_4.requested))
-        assert ax.get_ylim() == pytest.approx((-0.08 * high, high))
-        beyond = int(np.sum(upper(loop_poles(other, law.law)).real < 1.12 * SET_4.requested.real.min()))
-        assert ax.get_title(loc="left") == law.name + (f" ({beyond} faster left out)" if beyond else "")
-    one = poles_figure(tracking(outcome(SET_1)))
-    assert len(one.axes) == 1
-    assert drawing.get_size_inches()[1] == pytest.approx(one.get_size_inches()[1] + 2.0)
+        assert panel.limits[1] == pytest.approx(high)
+        assert panel.title == f"{law.name}, imaginary part"
+    every = [(p, loop_poles(other, law.law), law.poles, law.requested) for law in (SET_1, SET_4, SUM)
+             for p in [RIG.linear(AT).poles()]]  # fmt: skip
+    beyond = sum(z.real < left or z.imag > high for kinds in every for p in kinds for z in upper(p))
+    assert drawing.note == f"; {beyond} outside the picture"
 
 
 def test_the_tradeoff_shows_the_curve_its_bounds_and_every_law():
@@ -209,23 +208,24 @@ def test_the_tradeoff_shows_the_curve_its_bounds_and_every_law():
 def test_root_loci_share_a_scale_and_show_the_upper_half():
     open_loop = np.array([0, -2.0, -1 + 20j, -1 - 20j])
     loci = [
-        RootLocus(title=title, tracks=np.array([[-1 + 2j, -1 - 2j], [-3.0, -4 + 5j]]),
+        RootLocus(title=title, gains=np.array([1.0, 2.0]), tracks=np.array([[-1 + 2j, -1 - 2j], [-3.0, -4 + 5j]]),
                   marked=np.array([-3 - 1j, -3 + 1j]), zeros=zeros)
         for title, zeros in (("near encoder", np.array([-5.0, 7j])), ("far encoder", np.array([-5.0 + 0j])))
     ]  # fmt: skip
-    drawing = loci_figure(loci, open_loop)
+    drawing = loci_chart(loci, open_loop, of="as kp rises", symbol="kp", marked="tuned")
     size = 1.5 * math.hypot(1, 20)
-    for ax, locus in zip(drawing.axes, loci, strict=True):
-        lines = {line.get_label(): line for line in ax.get_lines()}
-        np.testing.assert_allclose(points(lines["as kp rises"]), np.sort_complex([-1 + 2j, -3, -4 + 5j]))
+    assert drawing.span == pytest.approx((-size, 0.6 * size))
+    for panel, locus in zip(drawing.panels, loci, strict=True):
+        lines = {line.name: line for line in panel.lines}
+        tracks = [line for line in panel.lines if not line.mark]
+        np.testing.assert_allclose(points(tracks[0]), np.sort_complex([-1 + 2j, -3]))
+        np.testing.assert_allclose(points(tracks[1]), [-4 + 5j])
+        assert [line.notes for line in tracks] == [("kp 1.00", "kp 2.00")] * 2
         np.testing.assert_allclose(points(lines["open loop"]), np.sort_complex([0, -2, -1 + 20j]))
         np.testing.assert_allclose(points(lines["zero"]), np.sort_complex(locus.zeros))
-        np.testing.assert_allclose(points(lines["kp of the tuned PD"]), [-3 + 1j])
-        assert ax.get_xlim() == pytest.approx((-size, 0.6 * size))
-        assert ax.get_ylim() == pytest.approx((-0.05 * size, size))
-        assert ax.get_title(loc="left") == locus.title
-        (shaded,) = ax.patches
-        assert (shaded.get_x(), shaded.get_width()) == (0.0, pytest.approx(size))
+        np.testing.assert_allclose(points(lines["tuned"]), [-3 + 1j])
+        assert panel.limits[1] == pytest.approx(size)
+        assert panel.title == locus.title
 
 
 def test_colours_differ_from_law_to_law():

@@ -243,6 +243,16 @@ def test_a_wide_swing_of_one_frequency_is_explained_alike_beside_a_line_that_is_
     assert abs(alone - small).max() > 1e-3 * abs(small).max()
 
 
+def test_what_was_known_before_is_no_part_of_the_misfit():
+    """An inertia stated 20 % too large, to 1 %: exact data leave no misfit, and it ends 20 of its errors away."""
+    rig = asked(b_1=GUESS["b_1"], J_d=GUESS["J_d"])
+    wrong = replace(rig.parameters["J_d"], value=1.2 * FURUTA.J_d, uncertainty=0.01 * FURUTA.J_d)
+    found = least_squares(replace(rig, parameters={**rig.parameters, "J_d": wrong}), "hanging", smooth())
+    assert found.way.values["J_d"] == pytest.approx(FURUTA.J_d, rel=1e-3)
+    assert found.surprise["J_d"] == pytest.approx(math.log(1 / 1.2) / (0.01 / 1.2), rel=0.01)
+    assert found.misfit < 0.01
+
+
 def test_both_ways_recover_a_smooth_rig_from_bad_guesses():
     """The response comes from the paper's transfer functions, corrected; errata 4 and 5."""
     data = smooth()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from upright.experiments.frequency_1b.at_once import AtOnce
-from upright.experiments.frequency_1b.figures import bode_figure, quality_figure
+from upright.experiments.frequency_1b.figures import bode_charts, quality_chart
 from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
 from upright.experiments.stand.fits import fit_chapter
 from upright.identification.frequency.answer import FrequencyFit, curves, digits, key_value
@@ -20,7 +20,7 @@ from upright.identification.model.fit import Estimate
 from upright.report.fit.tables import finding, parameter_table, plain_estimate, pole_table
 from upright.report.page import Chapter, KeyNumber, Part, Picture, Points, Step, Symbol, Table
 from upright.report.rig import rig_drawing
-from upright.report.symbols import number, typed, unit
+from upright.report.symbols import number, plain, typed, unit
 
 QUESTION = (
     "What does the rig answer to a sine, and which numbers of its equations does that fix, the pole by which it falls "
@@ -92,7 +92,7 @@ def log_chapter(result: LoggedResponse) -> Chapter:
     return Chapter(
         key="1b", title="Frequency response", question="What does the rig answer, frequency by frequency?",
         verdict=verdict, sound=not poor.all(),
-        parts=(source_part, Part("Response", (_bode_picture(data), _response_table(response)))),
+        parts=(source_part, Part("Response", (*_bode_pictures(data), _response_table(response)))),
         steps=(
             Step("Fit it: name the make, and what of it is known.",
                  f"upright frequency {typed(result.folder / 'frequency.csv')} --rig linear -o again"),
@@ -217,7 +217,7 @@ def _answer_parts(
     """Data with both fits, their cost, and the numbers."""
     left = (Points(answer.left_out),) if answer.left_out else ()
     return (
-        Part("Response and fits", (*left, _bode_picture(answer.data, answer))),
+        Part("Response and fits", (*left, *_bode_pictures(answer.data, answer))),
         Part(
             "Two ways to fit it",
             (
@@ -276,30 +276,30 @@ def _parameter_table(answer: FrequencyFit, truth: Mapping[str, float] | None = N
     )  # fmt: skip
 
 
-def _bode_picture(data: FrequencyResponse, answer: FrequencyFit | None = None) -> Picture:
-    """The paper's fig. 5 with residuals."""
-    caption = (
-        "Magnitude and phase of what the encoders showed per unit of command, with 95 % bars (mostly smaller than the "
-        "points); both fits; below, what each fit leaves, on a scale that is linear within ±0.1."
-        if answer is not None
-        else "Magnitude and phase of each output per unit of command, with 95 % bars."
-    )
-    return Picture(
-        name="bode", caption=caption,
-        draw=lambda: bode_figure(data, answer, fine=curves(answer) if answer is not None else ()),
-        description=f"{len(data)} frequencies, {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s.",
-    )  # fmt: skip
+def _bode_pictures(data: FrequencyResponse, answer: FrequencyFit | None = None) -> list[Picture]:
+    """The paper's fig. 5, an output each, with what the fits leave."""
+    fits = " Both fits; below, how far each misses the points." if answer is not None else ""
+    charts = bode_charts(data, answer, fine=curves(answer) if answer is not None else ())
+    return [
+        chart.picture(
+            f"bode{j or ''}",
+            caption=f"Magnitude, phase and coherence of {plain(output)} per unit of command, with 95 % bars (mostly "
+            f"smaller than the points).{fits}",
+            description=f"{len(data)} frequencies, {data.omega[0]:.3g} to {data.omega[-1]:.3g} rad/s.",
+        )
+        for j, (output, chart) in enumerate(zip(data.outputs, charts, strict=True))
+    ]
 
 
 def _quality_picture(data: FrequencyResponse) -> Picture:
     """Coherence, distortion, error and amplitude."""
-    return Picture(
-        name="quality", draw=lambda: quality_figure(data),
-        caption="What each point is worth: how far its coherence stays below 1, harmonics (dry friction makes them), "
-        "stated error, and the motion and command it was measured with.",
+    return quality_chart(data).picture(
+        "quality",
+        caption="What each point is worth: how far its coherence stays below 1, harmonics (dry friction makes them; a "
+        "sweep measures none), stated error, and the motion and command it was measured with.",
         description=f"Least coherence {float(data.coherence.min()):.4g}, "
         f"largest distortion {float(data.distortion.max()):.2g}.",
-    )  # fmt: skip
+    )
 
 
 def _numbers(

@@ -13,11 +13,9 @@ import numpy as np
 from upright.basis import SIMULATED
 from upright.control.effort import QUIET_RMS, of_limit
 from upright.experiments.tracking_3.figures import (
-    RootLocus,
     Tradeoff,
     in_reading_unit,
-    loci_figure,
-    poles_figure,
+    poles_chart,
     steps_figure,
     tradeoff_figure,
 )
@@ -30,6 +28,7 @@ from upright.paper.reproduce import TABLE_2
 from upright.report.fit.chapter import motion_part, run_pictures
 from upright.report.fit.tables import finding, parameter_table
 from upright.report.page import Block, Chapter, KeyNumber, Part, Picture
+from upright.report.planes import RootLocus, loci_chart
 from upright.report.prose import chapter_of
 from upright.report.rig import of_rig
 from upright.report.symbols import number, plain
@@ -130,8 +129,8 @@ def _findings(result: Tracking) -> tuple[KeyNumber, ...]:
 
 
 def _pole_picture(result: Tracking) -> Picture:
-    return Picture(
-        name="track-poles", draw=lambda: poles_figure(result),
+    return poles_chart(result).picture(
+        "track-poles",
         caption="Poles requested (rings), of the sampled, late loop on the fitted model (+) and the rig (x). "
         "Delay and differences move the fast poles; the flexible mode stays where it was requested.",
         description="Upper half of the s-plane for every set.",
@@ -156,7 +155,7 @@ def _reasons(result: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> 
     loci: list[RootLocus] = []
     for title, body, zeros in (("near encoder", 0, [-1 / rate, swing]), ("far encoder", 1, [-1 / rate])):
         loci.append(
-            RootLocus(title=title, tracks=root_locus(model, body, rate, rising),
+            RootLocus(title=f"{title}: imaginary part", gains=rising, tracks=root_locus(model, body, rate, rising),
                   marked=root_locus(model, body, rate, np.array([pd.k_pf]))[0], zeros=np.array(zeros, dtype=complex))
         )  # fmt: skip
     return [
@@ -166,8 +165,8 @@ def _reasons(result: Tracking, tuned: Outcome, stiff: Outcome, bound: float) -> 
             "outside of it. All as the loops run; dashed: the most that PD can reach without damping and delay.",
             description="Decay of the slowest pole over static force per error.",
         ),
-        Picture(
-            name="track-loci", draw=lambda: loci_figure(loci, model.poles()),
+        loci_chart(loci, model.poles(), of="as kp rises", symbol="kp", marked="kp of the tuned PD").picture(
+            "track-loci",
             caption="Poles as kp rises, kd/kp as tuned. Poles and zeros alternate at the near encoder, and every "
             "branch stays left; at the far encoder the flexible mode goes right at once.",
             description="Two root loci, upper half plane.",

@@ -11,7 +11,6 @@ import numpy as np
 
 from upright.experiments.tracking_3.laws import AT, loop_poles
 from upright.experiments.tracking_3.run import BEFORE, DWELL, Outcome, Tracking
-from upright.gains.requests import Roots
 from upright.records import Array
 from upright.report.drawing import (
     BLACK,
@@ -23,10 +22,10 @@ from upright.report.drawing import (
     decimated,
     draw_limits,
     figure,
-    roots,
-    s_plane,
     styled,
 )
+from upright.report.interactive.charts import Chart
+from upright.report.planes import Poles, pole_panels
 from upright.report.symbols import axis, mathtext, plain, unit
 
 if TYPE_CHECKING:
@@ -102,41 +101,21 @@ def _efforts(ax: Any, result: Tracking, outcomes: Sequence[Outcome], until: floa
     ax.set_ylabel(axis("command", result.rig.unit))
 
 
-@styled
-def poles_figure(result: Tracking) -> Figure:
+def poles_chart(result: Tracking) -> Chart:
     """Requested and attained poles, set by set; the upper half plane, which the lower mirrors."""
     laws, open_loop = [o.law for o in result.sets], result.model.linear(AT).poles()
-    columns = min(2, len(laws))
-    rows = -(-len(laws) // columns)
-    drawing = figure(0.85 + 2.0 * rows, margins=(0.65, 0.15, 0.55, 0.48))
-    grid: Any = drawing.subplots(
-        rows, columns, squeeze=False, sharey=True, gridspec_kw={"hspace": 0.32, "wspace": 0.08}
-    )
-    axes: list[Any] = grid.ravel().tolist()
     left = 1.12 * min(float(law.requested.real.min()) for law in laws)
     high = 1.2 * max(float(np.abs(p.imag).max()) for p in (open_loop, *(law.requested for law in laws)))
-    for ax, law in zip(axes, laws, strict=False):
-        s_plane(ax)
-        on_rig = loop_poles(result.rig, law.law)
-        kinds = (
-            ("open loop", open_loop, "x", GREY, 6), ("requested", law.requested, "o", BLACK, 9),
-            ("on the fitted model, sampled and late", law.poles, "+", BLUE, 9),
-            ("on the rig", on_rig, "x", VERMILLION, 6),
-        )  # fmt: skip
-        beyond = int(np.sum((on_rig.real < left) & (on_rig.imag > -1e-9)))
-        for name, values, mark, colour, size in kinds:
-            roots(ax, values[values.imag > -1e-9], mark, colour, name, size=size)
-        ax.set_xlim(left, -0.06 * left)
-        ax.set_ylim(-0.08 * high, high)
-        ax.set_title(law.name + (f" ({beyond} faster left out)" if beyond else ""), fontsize=9)
-    for ax in axes[:-columns]:
-        ax.set_xlabel("")
-    for ax in axes[::columns]:
-        ax.set_ylabel("imaginary part [rad/s]")
-    for ax in axes[len(laws) :]:
-        ax.set_visible(False)
-    drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=4)
-    return drawing
+    sets = {
+        f"{law.name}, imaginary part": [
+            Poles(name="open loop", values=open_loop, mark="x", colour="ink-2"),
+            Poles(name="requested", values=law.requested, mark="o"),
+            Poles(name="on the fitted model, sampled and late", values=law.poles, mark="+", colour="q0"),
+            Poles(name="on the rig", values=loop_poles(result.rig, law.law), mark="x", colour="q1"),
+        ]
+        for law in laws
+    }
+    return pole_panels(sets, left, -0.06 * left, high)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -170,39 +149,4 @@ def tradeoff_figure(bargain: Tradeoff) -> Figure:
     ax.set_xlabel(f"static force per error [{unit(bargain.unit)}]")
     ax.set_ylabel("decay of the slowest pole [1/s]")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
-    return drawing
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RootLocus:
-    """Poles [1/s] as kp rises, shape (kp, states), with the poles at one marked kp, and the zeros."""
-
-    title: str
-    tracks: Roots
-    marked: Roots
-    zeros: Roots
-
-
-@styled
-def loci_figure(loci: Sequence[RootLocus], open_loop: Roots) -> Figure:
-    """Root loci of PD control of either body, in one scale; the right half plane is shaded."""
-    drawing = figure(3.5, margins=(0.65, 0.15, 0.3, 0.78))
-    axes: list[Any] = drawing.subplots(1, len(loci), sharey=True, squeeze=False, gridspec_kw={"wspace": 0.08})[
-        0
-    ].tolist()
-    size = 1.5 * float(np.abs(open_loop).max())
-    for ax, locus in zip(axes, loci, strict=True):
-        s_plane(ax, unstable=size)
-        upper = locus.tracks[locus.tracks.imag > -1e-9]
-        ax.plot(upper.real, upper.imag, ".", color=BLUE, markersize=1.6, label="as kp rises")
-        for values, mark, colour, name in (
-            (open_loop, "x", BLACK, "open loop"), (locus.zeros, "o", BLACK, "zero"),
-            (locus.marked, "s", VERMILLION, "kp of the tuned PD"),
-        ):  # fmt: skip
-            roots(ax, values[values.imag > -1e-9], mark, colour, name)
-        ax.set_xlim(-size, 0.6 * size)
-        ax.set_ylim(-0.05 * size, size)
-        ax.set_title(locus.title)
-    axes[0].set_ylabel("imaginary part [rad/s]")
-    drawing.legend(*axes[0].get_legend_handles_labels(), loc="lower center", ncols=4)
     return drawing

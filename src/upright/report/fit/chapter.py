@@ -48,6 +48,7 @@ from upright.report.page import (
     Symbol,
     Table,
 )
+from upright.report.planes import fitted_poles_chart
 from upright.report.rig import rig_drawing
 from upright.report.symbols import percent, plain
 
@@ -288,7 +289,13 @@ def _parameters(fit: Fit) -> list[Part]:
             "Of the linear model at each equilibrium, viscous friction and back-EMF included, dry friction not; what "
             "the runs held is held."
         )
-        parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, poles), folded=True))
+        drawn = fitted_poles_chart(fit.poles).picture(
+            "fit-poles",
+            caption="Poles in the upper half of the s-plane, with bars for the 95 % intervals of real and imaginary "
+            "part. Tinted: unstable.",
+            description="The same poles as in the table below.",
+        )
+        parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, drawn, poles), folded=True))
     return parts
 
 

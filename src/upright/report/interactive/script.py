@@ -12,6 +12,12 @@ _BANNER = "/* uPlot 1.6.32, copyright (c) 2022 Leon Sorokin, MIT License */\n"
 
 
 @cache
+def cursor_script() -> str:
+    """The cursor of charts, which needs no library."""
+    return _COMMENTS.sub("", _file("charts.js"))
+
+
+@cache
 def script() -> str:
     """All of it, without comments and indentation; the style comes with it, so that a page has only to run it."""
     library = _file("uplot/uPlot.iife.min.js").partition("\n")[2]

@@ -1,0 +1,95 @@
+"""Do charts put values where their axes say, in text that a phone shows and an SVG that a PDF takes?"""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from tests.report.interactive.drawn import circles, curve, drawings
+from upright.report.interactive.charts import WIDTHS, Chart, ChartLine, ChartPanel, decade_ticks, round_ticks
+
+T = np.linspace(0.0, 2.0, 101)
+SINE = ChartLine(name="sine", x=T, y=3.0 * np.sin(T), colour="q0")
+POINTS = ChartLine(name="points", x=np.array([0.5, 1.5]), y=np.array([-1.0, 2.0]), mark="o", colour="q1")
+
+
+def chart(*lines, **how):
+    return Chart(
+        x="time", unit="s", panels=(ChartPanel(title="angle", unit="rad", lines=lines or (SINE, POINTS), **how),)
+    )
+
+
+def test_a_curve_and_its_points_lie_where_the_axes_say():
+    drawn = chart()
+    x, y = curve(drawn, 0, "--q0")
+    np.testing.assert_allclose(y, 3.0 * np.sin(x), atol=0.05)  # a tenth of a unit of 150 is 0.003 of 4.3 rad
+    np.testing.assert_allclose(circles(drawn, 0, "--q1"), [[0.5, -1.0], [1.5, 2.0]], atol=5e-3)
+
+
+def test_logarithmic_axes_take_the_logarithm():
+    w = np.geomspace(1.0, 100.0, 50)
+    line = ChartLine(name="", x=w, y=1e3 / w**2, colour="q0")
+    drawn = Chart(x="frequency", panels=(ChartPanel(title="gain", lines=(line,), logarithmic=True),), logarithmic=True)
+    x, y = curve(drawn, 0, "--q0")
+    np.testing.assert_allclose(x[[0, -1]], [1.0, 100.0], rtol=0.01)
+    np.testing.assert_allclose(x**2 * y, 1e3, rtol=0.02)
+
+
+@pytest.mark.parametrize(("low", "high", "most"), [(0.0, 1.0, 5), (-3.2, 7.9, 4), (1e-4, 9e-4, 6), (-1e6, 2e6, 3)])
+def test_ticks_are_few_round_and_within(low, high, most):
+    at = np.array(round_ticks(low, high, most))
+    steps = np.diff(at)
+    assert 2 <= at.size <= most + 1
+    assert low <= at.min()
+    assert at.max() <= high
+    digit = steps[0] / 10 ** np.floor(np.log10(steps[0]) + 1e-9)
+    assert min(abs(digit - d) for d in (1, 2, 5)) < 1e-9
+    np.testing.assert_allclose(steps, steps[0])
+
+
+def test_decades_are_labelled_at_one_two_and_five_where_there_is_room():
+    assert decade_ticks(1.0, 20.0, 9) == [1.0, 2.0, 5.0, 10.0, 20.0]
+    assert decade_ticks(1e-3, 1e3, 7) == pytest.approx([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3])
+
+
+def test_text_has_twelve_pixels_in_the_column_that_a_phone_of_360_leaves():
+    """16 px of margin on either side leave 328; the drawing for a desk stands from 580 on."""
+    for kind, column in (("narrow", 328), ("wide", 580)):
+        svg = drawings(chart().svg("a"))[kind]
+        assert float(svg.get("font-size")) * min(1.0, column * (0.88 if kind == "wide" else 1.0) / WIDTHS[kind]) >= 10.3
+        assert svg.get("viewBox").split()[2] == f"{WIDTHS[kind]:g}"
+    assert float(drawings(chart().svg("a"))["narrow"].get("font-size")) * 328 / WIDTHS["narrow"] >= 12
+
+
+def test_what_is_not_finite_leaves_a_gap_and_is_no_value():
+    broken = ChartLine(name="", x=np.array([0.0, 1.0, 2.0, 3.0, 4.0]), y=np.array([0.0, 1.0, np.nan, 1.0, np.inf]))
+    drawn = chart(broken)
+    (line,) = json.loads(drawn.values())["panels"][0]["lines"]
+    assert line["y"] == [0, 1, None, 1, None]
+    assert "nan" not in drawn.svg("a")
+    assert "inf" not in drawn.svg("a")
+
+
+def test_an_empty_or_constant_line_still_has_axes():
+    for y in (np.zeros(0), np.zeros(3), np.full(3, np.nan)):
+        assert "<text" in chart(ChartLine(name="", x=np.arange(y.size, dtype=float), y=y)).svg("a")
+
+
+def test_limits_are_named_beside_their_line():
+    assert ">limit<" in chart(levels=((2.0, "limit"),)).svg("a")
+    assert ">limit<" not in chart(levels=((200.0, "limit"),), limits=(-1.0, 1.0)).svg("a")
+
+
+def test_names_are_text_and_not_mark_up():
+    named = ChartLine(name="<b>&", x=T, y=T)
+    assert "<b>" not in chart(named, SINE).svg("a")
+    assert "</script" not in chart(ChartLine(name="</script>", x=T, y=T)).values()
+
+
+def test_colours_are_those_of_the_page_with_one_for_paper():
+    markup = chart().svg("a")
+    painted = set(re.findall(r'(?:stroke|fill)="(?!none|url)([^"]*)"', markup))
+    assert painted <= set(re.findall(r"var\(--[\w-]+, #[0-9a-f]{6}\)", markup))

@@ -1,0 +1,110 @@
+"""Does a cursor tell a chart's values by mouse, touch and keys, and leave paper alone?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.live.browser import opened
+from upright.report.html import write_html
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
+from upright.report.page import Chapter, Part
+from upright.report.planes import Poles, pole_chart
+
+pytestmark = pytest.mark.slow
+
+T = np.linspace(0.0, 10.0, 201)
+MOTION = Chart(
+    x="time", unit="s",
+    panels=(ChartPanel(title="angle", unit="rad", lines=(ChartLine(name="", x=T, y=np.sin(T), colour="q0"),)),
+            ChartPanel(title="speed", unit="rad/s", lines=(ChartLine(name="", x=T, y=np.cos(T), colour="q1"),))),
+)  # fmt: skip
+POLES = np.array([-3 + 4j, -3 - 4j, -12.0, 2.0])
+PLANE = pole_chart([Poles(name="loop", values=POLES, mark="x")])
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    pictures = (MOTION.picture("motion", caption="A motion.", description="Sine and cosine."),
+                PLANE.picture("plane", caption="Poles.", description="Four poles."))  # fmt: skip
+    page = Chapter(title="Charts", verdict="Read them.", parts=(Part("Pictures", pictures),))
+    return write_html(tmp_path_factory.mktemp("charts") / "page.html", page)
+
+
+def told(page, name):
+    """What stands below the picture, and what a reader hears."""
+    figure = page.locator("figure").filter(has=page.locator(f'.read[aria-label="{name}"]'))
+    heard = figure.locator(".read").get_attribute("aria-valuetext")
+    assert figure.locator(".chart-reading").inner_text() == heard
+    return heard.replace("\u2212", "-")
+
+
+def numbers(text):
+    return [float(word) for word in text.replace(":", " ").replace(";", " ").replace(",", " ").split() if _is(word)]
+
+
+def _is(word):
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_the_mouse_reads_every_panel_at_one_time(written, width):
+    with opened(written, width=width) as (page, wrong):
+        axes = page.locator("figure .panel:visible").first.locator("rect, path").first
+        svg = page.locator(".read[aria-label='Sine and cosine.'] svg:visible")
+        svg.scroll_into_view_if_needed()
+        box = svg.bounding_box()
+        for share in (0.4, 0.8):
+            page.mouse.move(box["x"] + share * box["width"], box["y"] + 60)
+            t, angle, speed = numbers(told(page, "Sine and cosine."))
+            assert (angle, speed) == (pytest.approx(math.sin(t), abs=1e-4), pytest.approx(math.cos(t), abs=1e-4))
+            # the axes leave 50 units at the left and 14 at the right
+            units = 640 if width == 1280 else 330
+            assert t == pytest.approx((share * units - 50) / (units - 64) * 10, abs=0.06)
+        assert svg.locator(".cursor circle").count() == 2
+        assert axes.count() == 1
+        assert wrong == []
+
+
+def test_keys_go_from_pole_to_pole_and_name_frequency_and_damping(written):
+    """Of -3 + 4i: 5 rad/s and 3/5."""
+    with opened(written) as (page, wrong):
+        page.locator(".read[aria-label='Four poles.']").focus()
+        heard = []
+        for _ in range(4):
+            page.keyboard.press("ArrowRight")
+            heard.append(told(page, "Four poles."))
+        assert heard[0] == "loop: -3 ± 4 i 1/s, natural frequency 5 rad/s, damping ratio 0.6"
+        assert heard[1:3] == ["loop: -12 1/s", "loop: 2 1/s"]
+        assert heard[3] == heard[2]  # the lower half is not read again
+        page.keyboard.press("Home")
+        assert told(page, "Four poles.") == heard[0]
+        assert wrong == []
+
+
+def test_a_finger_reads_the_pole_that_it_touches(written):
+    with opened(written, width=360) as (page, wrong):
+        read = page.locator(".read[aria-label='Four poles.']")
+        read.scroll_into_view_if_needed()
+        box = read.locator("svg:visible").bounding_box()
+        low, high = PLANE.span
+        x = box["x"] + (50 + (330 - 64) * (-12 - low) / (high - low)) * box["width"] / 330
+        read.dispatch_event("pointerdown", {"clientX": x, "clientY": box["y"] + box["height"] - 60, "bubbles": True})
+        assert told(page, "Four poles.") == "loop: -12 1/s"
+        assert wrong == []
+
+
+def test_without_a_script_and_on_paper_the_drawing_for_its_width_is_there(written):
+    for width, kind in ((360, "narrow"), (1280, "wide")):
+        with opened(written, width=width, script=False) as (page, _):
+            shown = page.locator(".chart svg:visible")
+            assert [s.get_attribute("class") for s in shown.all()] == [kind] * 2
+    with opened(written) as (page, _):
+        page.emulate_media(media="print")
+        assert page.locator(".chart-reading:visible").count() == 0
