@@ -137,7 +137,7 @@ def minute(board, folder, travel=2.0, speed=20.0, **more):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("wiring", "refused"),
-    [({}, ""), ({"gain": -GAIN}, "motor leads swapped"),
+    [({}, None), ({"gain": -GAIN}, "motor leads swapped"),
      ({"counts_theta": -COUNTS * 8192 / 16000},
       "encoder channels of theta swapped; theta: counts per turn 8000 or 8192, not 16000")],
 )  # fmt: skip

@@ -62,7 +62,7 @@ def test_a_pendulum_may_rest_on_a_body_that_goes_on_straight(speed):
 
 @pytest.mark.parametrize("lean", [0.03, 0.2])
 def test_where_body_and_pendulum_both_stand_still_nobody_can_tell_however_far_it_leans(lean):
-    """A hand leans on the pendulum, its hinge and the body's friction hold the rest: 2 of 30 Furutas were stopped so
+    """A hand leans on the pendulum, its hinge and the body's friction hold the rest: 1 of 30 Furutas was stopped so
     within 5 hours. A lean that is shown at all, of a body that moves as little as a count, is no evidence."""
     still = StillPendulum(RIG, "inverted")
     assert not any(still.sees([-0.47 - (k > 300) / RIG.per_unit[0], lean]) for k in range(1000))

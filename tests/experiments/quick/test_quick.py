@@ -56,6 +56,22 @@ def test_a_rig_that_is_wired_otherwise_than_described_is_not_swung_up(tmp_path, 
     assert not (tmp_path / "out" / "swing_up.mcap").exists()
 
 
+@pytest.mark.slow
+def test_limits_within_which_no_swing_up_can_be_stopped_are_said_and_nothing_is_swung_up(tmp_path):
+    path = described(tmp_path)
+    text = '[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "0.5 rad"\nspeed = "6 rad/s"\nstart = "0.4 rad"\n'
+    path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
+    answer = up.lab(rig=str(path), quick=True, out=tmp_path / "out")
+    told = answer.numbers["experiments"]["quick"]["numbers"]
+    assert told["refused"].startswith("no swing-up of ")
+    assert told["refused"].endswith("allow more travel or speed")
+    assert told["fit"]["parameters"]["J_d"]["value"] > 0  # what it is was found all the same
+    assert told["wrong"] == []
+    assert not (tmp_path / "out" / "quick" / "swing_up.mcap").exists()
+    assert "were caught" not in str(answer)  # none was tried
+    assert "wiring: no swing-up" not in str(answer)
+
+
 def test_a_minute_is_for_a_rig_and_by_itself(tmp_path):
     with pytest.raises(BadInput, match=r"--rig RIG.toml --quick"):
         up.lab(rig="furuta", quick=True, out=tmp_path)

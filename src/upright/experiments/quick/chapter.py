@@ -134,7 +134,7 @@ def _steps(result: QuickRun) -> tuple[Step, ...]:
 
 def _findings(result: QuickRun) -> tuple[KeyNumber, ...]:
     if result.refused is not None:
-        return (KeyNumber(what="wiring", value=result.refused),)
+        return (KeyNumber(what="wiring" if result.wiring.wrong else "no loop", value=result.refused),)
     return (KeyNumber(what="time at the rig", value=f"{result.seconds:.0f} s"),)
 
 
