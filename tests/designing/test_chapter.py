@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 import upright as up
@@ -177,6 +176,8 @@ def test_the_way_of_the_poles_of_least_cost_passes_through_those_chosen(weights)
     assert done.R is not None
     pictures = {b.name: b for part in chapter(done).parts for b in part.content if hasattr(b, "draw")}
     (plane,) = pictures["locus"].draw().panels
-    drawn = [complex(*z) for line in plane.lines if not line.mark for z in zip(line.x, line.y, strict=True)]
+    drawn = [
+        complex(*z) for line in plane.lines if not line.mark for z in zip(line.x, line.y, strict=True) if z[1] == z[1]
+    ]
     for pole in done.wanted[done.wanted.imag >= 0]:
         assert min(abs(z - pole) for z in drawn) < 0.05 * abs(pole)
