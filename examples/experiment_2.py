@@ -13,7 +13,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from upright.control import design_swing_up
-from upright.control.swing_up import swing_up
+from upright.control.swing_up import ascent_of
+from upright.control.trial import trial
 from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.regulation_2.run import run_regulation
 from upright.experiments.stand.twin import TwinStand
@@ -38,7 +39,10 @@ for a in done.attempts:
     print(f"  said beforehand: {a.before.word} ({share:.0f} %), came: {a.word}, {a.score.effort_peak:.1f} V at most")
 print(f"To recommend: {done.best.name}.")
 
-ascent = swing_up(rig, design_swing_up(identified), seconds=6)
+law = design_swing_up(identified)
+hanging, inverted = rig.plant.state("hanging"), rig.plant.state("inverted")
+rule, start = law.rule(rig, hanging), hanging - inverted
+ascent = ascent_of(trial(rig, rule, at="inverted", start=start, seconds=6), law, rule)
 print(f"From hanging: {ascent.swings} half swings, upright from {ascent.up:.2f} s on, {ascent.peak:.1f} V at most.")
 
 

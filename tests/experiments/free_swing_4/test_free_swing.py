@@ -19,7 +19,7 @@ from upright.experiments.free_swing_4.run import (
     write_questions,
 )
 from upright.experiments.stand.known import Known
-from upright.report.html import WORDS_OF_A_VERDICT, sentences, write_html
+from upright.report.html import WORDS_OF_A_VERDICT, split_sentences, write_html
 from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
@@ -132,7 +132,7 @@ def test_the_page_tells_it_all_without_leaving_the_page(done):
         assert needed in text
     assert "http" not in text.replace("http-equiv", "")
     assert len(text) < 2_000_000
-    assert all(sentence in text for sentence in sentences(release_page.chapter(done).verdict))
+    assert all(sentence in text for sentence in split_sentences(release_page.chapter(done).verdict))
 
 
 def test_a_cart_s_pendulum_is_found_too(tmp_path):

@@ -47,7 +47,7 @@ def response_of(
     command, outputs : str and sequence of str
         Columns, in the units of the response.
     kind : {"sines", "multisine", "sweep"}, optional
-        Excitation; recognised from the command when empty.
+        Excitation; recognised from the command when omitted.
     hold : float, optional
         Time for which the converter holds a command [s]; one sample when omitted.
     resolution : sequence of float
