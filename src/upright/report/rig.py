@@ -68,6 +68,7 @@ class _Drawing:
         around = np.vstack([self._flat(p) for q in ends for name, p in self._space(q) if name or self.deep])
         self.scale = _SIZE / (float(np.ptp(around, axis=0).max()) or 1.0)
         self.left, self.right = self.scale * around[:, 0].min() - 46, self.scale * around[:, 0].max() + 46
+        self.ground = math.inf
         self.boxes: list[Array] = []
         self.out: list[str] = []
 
@@ -144,6 +145,7 @@ class _Drawing:
         y = float(ends[-1, 1])
         if upright:
             self._line(np.array([[x0, y], [x1, y]]), grey, 1.5)
+            self.ground = y
         strokes = "".join(f"M{x:.1f} {y:.1f}l-8 9" for x in np.arange(x0 + 8, x1 + 1, 12))
         self.out.append(f'<path d="{strokes}" fill="none" stroke="{grey}" stroke-width="1.2"/>')
         self.boxes.append(np.array([[x0, y + 9], [x1, y + 9]]))
@@ -188,7 +190,10 @@ class _Drawing:
             away = zero - self._flat(first[0])[0]
             zero = zero + away / (np.linalg.norm(away) or 1.0) * 16
             rest = ", hanging" if self.plant.equilibria.get("hanging", {}).get(self.names[i]) == 0 else ""
-            self._write(zero[0], zero[1] + 5, f"{self.names[i]} = 0{rest}", "var(--ink-2, #485654)", small=True)
+            low = zero[1] + 5
+            if abs(low - 5 - self.ground) < 24:  # below the strokes of the ground
+                low = self.ground + 30
+            self._write(zero[0], low, f"{self.names[i]} = 0{rest}", "var(--ink-2, #485654)", small=True)
 
     def _tip(self, path: Array, colour: str) -> None:
         along = path[-1] - path[-4]
