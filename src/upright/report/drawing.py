@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#6b6b6b"
+PALE = "#e4e4e4"
 CYCLE = (
     (BLUE, "-"),
     (VERMILLION, "--"),
@@ -44,7 +45,7 @@ CYCLE = (
 """Colour and line style of the n-th curve."""
 _ON_DARK = {
     BLACK: "black", ORANGE: "orange", SKY: "sky", GREEN: "green", BLUE: "blue", VERMILLION: "vermillion",
-    PURPLE: "purple", GREY: "grey", "#ffffff": "white", "#e4e4e4": "grid",
+    PURPLE: "purple", GREY: "grey", "#ffffff": "white", PALE: "grid",
 }  # fmt: skip
 """Custom properties of a page's style that may replace a colour of a picture, ``--mpl-blue`` and so on."""
 
@@ -60,7 +61,7 @@ _STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.unicode_minus": True,
-    "grid.color": "#e4e4e4",
+    "grid.color": PALE,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "legend.fontsize": 8.5,

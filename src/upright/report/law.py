@@ -10,7 +10,7 @@ import numpy as np
 from upright.closed_loop import Recovery
 from upright.closed_loop.recovery import TriedStructure, loop_recovered, loop_written
 from upright.records import Array, Record
-from upright.report.drawing import BLUE, GREY, VERMILLION, decimated, figure, styled
+from upright.report.drawing import BLUE, GREY, PALE, VERMILLION, decimated, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
 
 if TYPE_CHECKING:
@@ -101,9 +101,7 @@ def draw_law(record: Record, recovery: Recovery) -> Figure:
     _both(close, t[part], u[part], t[part], law[part], points=True)
     close.set_title("close up, where it moves most")
     if recovery.resolution:
-        left.axhspan(
-            -recovery.resolution / 2, recovery.resolution / 2, color="#eeeeee", label="half a step of the column"
-        )
+        left.axhspan(-recovery.resolution / 2, recovery.resolution / 2, color=PALE, label="half a step of the column")
     left.plot(*decimated(t, recovery.residual[3:], buckets=800), color=GREY, linewidth=0.8, label="recorded − law")
     for axes in (whole, close):
         axes.set_ylabel(f"{recovery.command[:24]}{unit}", parse_math=False)

@@ -12,7 +12,7 @@ import numpy as np
 from upright.control import Trial, score
 from upright.control.preflight import WORDS
 from upright.experiments.regulation_2.run import Attempt
-from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION, decimated, figure, styled
+from upright.report.drawing import BLACK, BLUE, GREY, ORANGE, PALE, SKY, VERMILLION, decimated, figure, styled
 from upright.report.symbols import axis, mathtext
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ COLOURS: Mapping[str, tuple[str, str]] = {
     "stabilised with saturation": (SKY, "///"),
     "stabilised with excessive effort": (ORANGE, "///"),
     "does not settle": (ORANGE, "..."),
-    "leaves its travel": ("#d9d9d9", "..."),
+    "leaves its travel": (PALE, "..."),
     "falls": (VERMILLION, "xxx"),
 }
 """Fill and hatching of every end of a run, so that grey print tells them apart."""

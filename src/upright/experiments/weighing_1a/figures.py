@@ -9,7 +9,7 @@ import numpy as np
 
 from upright.identification.loadings import Loaded, Loadings, Plan
 from upright.records import Record
-from upright.report.drawing import BLUE, CYCLE, GREY, VERMILLION, decimated, figure, styled
+from upright.report.drawing import BLUE, CYCLE, GREY, PALE, VERMILLION, decimated, figure, styled
 from upright.report.symbols import unit
 from upright.signals.free_swing import Decay
 
@@ -51,7 +51,7 @@ def extremes_figure(swings: Sequence[tuple[Loaded, Record, str]]) -> Figure:
     for axes, (loaded, record, signal) in zip(panels, swings, strict=True):
         d = loaded.decay
         near = (record.t > d.t[0] - 2 / d.omega_d) & (record.t < d.t[-1] + 8 / d.omega_d)
-        axes.axhspan(d.centre - d.delta, d.centre + d.delta, color="#eeeeee")
+        axes.axhspan(d.centre - d.delta, d.centre + d.delta, color=PALE)
         axes.plot(*decimated(record.t[near], record[signal][near]), color=BLUE, linewidth=1.0, label="log")
         axes.plot(d.t, d.x, "o", color=VERMILLION, markersize=4.5, fillstyle="none", label="extremes")
         axes.plot(d.t, d.model, "+", color="black", markersize=6, label="recursion")
