@@ -29,7 +29,7 @@ from upright.identification.inference.ties import ties, with_ties
 from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
-from upright.identification.model.fit import Estimate, Fit, Pole, RunScore
+from upright.identification.model.fit import Assumption, Estimate, Fit, Pole, RunScore
 from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import correlation
@@ -309,7 +309,7 @@ def _conclude(
             bent=late.bent if late else (),
             missing=tuple(force.sentence() for force in forces if force.essential),
             period=min(t.period for t in problem.tracks),
-            standing=None if brief or identifiable.hidden else standing(best),
+            standing=None if brief or identifiable.hidden else standing(best, assumed),
             judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
@@ -340,7 +340,7 @@ def _conclude(
         path=tuple(log.path),
         interrupted=end.interrupted,
         not_evaluated=skipped,
-        poles={} if identifiable.hidden else _poles(best),  # a pole may depend on what the data cannot see
+        poles={} if identifiable.hidden else _poles(best, assumed),  # a pole may depend on what the data cannot see
         assumptions=assumed,
         bands=bands,
         failed=bool(best.lost),
@@ -377,7 +377,7 @@ def _correlation(best: Optimum, identifiable: Identifiability) -> Array:
     return correlation(best.covariance[np.ix_(places, places)])
 
 
-def _poles(best: Optimum) -> dict[str, tuple[Pole, ...]]:
+def _poles(best: Optimum, assumed: Sequence[Assumption]) -> dict[str, tuple[Pole, ...]]:
     values, names, C = shared_values(best)
     held = {frozenset(track.run.held) for track in best.problem.tracks}
-    return poles(best.problem.rig, values, names, C, best.quantile, held)
+    return poles(best.problem.rig, values, names, C, best.quantile, held, assumed)

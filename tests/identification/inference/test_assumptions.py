@@ -210,3 +210,19 @@ def test_an_interrupted_fit_calls_nothing_usable_that_may_rest_on_an_assumed_num
     assert fit.interrupted
     assert not usable(fit)
     assert "was not evaluated" in fit.verdict
+
+
+def test_the_pole_upright_rests_on_an_assumed_number_unless_the_swing_fixes_it():
+    # w^2 = m g l/J_A hanging is what the pole upright is, whatever length is assumed beside it; without J_A it is not
+    friction = {"b_2": 1e-3, "b_2c": 1e-3}
+    seen = identify(hanging({"l_cg": 0.22}, {"m_p": 0.2235}, {"J_p": 2e-3, **friction}), [swing()])
+    (fastest, _) = seen.poles["inverted"]
+    J_A = SWING["J_p"] + SWING["m_p"] * SWING["l_cg"] ** 2
+    loss = SWING["b_2"] / (2 * J_A)
+    true = (SWING["m_p"] * 9.81 * SWING["l_cg"] / J_A + loss**2) ** 0.5 - loss
+    assert not fastest.real.rests_on
+    assert fastest.real.value == pytest.approx(true, rel=1e-4)
+    assert "the fastest pole is " in seen.answers[2].headline
+    blind = identify(hanging({n: SWING[n] for n in ("l_cg", "J_p")}, {"m_p": 0.2235}, friction), [swing()])
+    assert blind.poles["inverted"][0].real.rests_on == ("l_cg", "J_p")
+    assert blind.answers[2].headline == "Inverted, the fastest pole is not known: it rests on l_cg, J_p (assumed)."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from upright.errors import UprightError
 from upright.identification.inference.covariance import Optimum
 from upright.identification.inference.poles import poles, shared_values
-from upright.identification.model.fit import Estimate
+from upright.identification.model.fit import Assumption, Estimate
 from upright.identification.model.grey_box import GreyBox
 from upright.identification.problem.normal_equations import to_one
 
@@ -36,7 +37,7 @@ class Standing:
     share: float
 
 
-def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
+def standing(best: Optimum, assumed: Sequence[Assumption] = (), *, seed: int = 0) -> Standing | None:
     """How rigs within the intervals stand at the equilibrium that grows fastest; None where none grows or is driven.
 
     One state feedback, placed for the estimate, meets plants drawn from the covariance, to first order in it: A and B
@@ -46,7 +47,7 @@ def standing(best: Optimum, *, seed: int = 0) -> Standing | None:
     if len(rig.plant.inputs) != 1:
         return None
     values, names, C = shared_values(best)
-    by_equilibrium = poles(rig, values, names, C, best.quantile)
+    by_equilibrium = poles(rig, values, names, C, best.quantile, assumed=assumed)
     growing = {at: max((p.real for p in there), key=lambda e: e.value) for at, there in by_equilibrium.items()}
     at = max(growing, key=lambda a: growing[a].value, default="")
     if not names:  # every number that was to be estimated was left out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import ImpossiblePhysics, NotIdentifiable
+from upright.identification.inference.assumptions import NEGLIGIBLE
 from upright.identification.inference.covariance import Optimum
-from upright.identification.model.fit import Estimate, Pole
+from upright.identification.model.fit import Assumption, Estimate, Pole
 from upright.identification.model.grey_box import GreyBox
 
 Array = NDArray[np.float64]
@@ -20,6 +21,9 @@ Array = NDArray[np.float64]
 STEP = 1e-4
 """Share of a standard error by which parameters are moved to see how the poles follow."""
 
+
+ASIDE = 2e-3
+"""Share by which an assumed number is moved to see whether the poles follow."""
 
 SPLIT = 1e-6
 """Imaginary parts below this share of the largest pole are rounding."""
@@ -36,7 +40,7 @@ def shared_values(best: Optimum) -> tuple[dict[str, float], list[str], Array]:
 
 def poles(
     rig: GreyBox, values: Mapping[str, float], names: list[str], covariance: Array, quantile: float,
-    held: Iterable[frozenset[str]] = (frozenset(),),
+    held: Iterable[frozenset[str]] = (frozenset(),), assumed: Sequence[Assumption] = (),
 ) -> dict[str, tuple[Pole, ...]]:  # fmt: skip
     """Poles [1/s] at each equilibrium, the fastest growing first, friction viscous only and back-EMF included.
 
@@ -56,6 +60,8 @@ def poles(
     held : iterable of sets of str
         Coordinates that did not move freely, for each way in which the rig was run: it swings otherwise then, and the
         equilibrium is called so.
+    assumed : sequence of Assumption
+        Numbers that nobody measured; a pole that moves with one, and with what the fit makes of it, rests on it.
     """
     out: dict[str, tuple[Pole, ...]] = {}
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -71,6 +77,7 @@ def poles(
                     moved = _poles(rig, {**values, name: values[name] + step}, at, still)
                     nearest = np.abs(moved[None, :] - here[:, None]).argmin(axis=1)
                     slope[:, i] = (moved[nearest] - here) / step
+            rests = [a.name for a in assumed], [_follow(rig, values, at, still, here, a) for a in assumed]
         except (ImpossiblePhysics, NotIdentifiable):
             continue
         errors = [
@@ -79,13 +86,32 @@ def poles(
         ]
         out[f"{at}, {' and '.join(sorted(still))} held" if still else at] = tuple(
             Pole(
-                real=_of_one_sign(float(p.real), float(a), quantile, "1/s"),
-                imag=_of_one_sign(float(p.imag), float(b), quantile, "rad/s"),
+                real=_resting(_of_one_sign(float(p.real), float(a), quantile, "1/s"), on),
+                imag=_resting(_of_one_sign(float(p.imag), float(b), quantile, "rad/s"), on),
             )
-            for p, a, b in zip(here, *errors, strict=True)
+            for i, (p, a, b) in enumerate(zip(here, *errors, strict=True))
             if p.imag >= 0
+            for on in [tuple(name for name, follows in zip(*rests, strict=True) if follows[i])]
         )
     return out
+
+
+def _resting(e: Estimate, on: tuple[str, ...]) -> Estimate:
+    return replace(e, rests_on=on, status=f"rests on {', '.join(on)}") if on else e
+
+
+def _follow(
+    rig: GreyBox, values: Mapping[str, float], at: str, still: frozenset[str], here: NDArray[np.complex128],
+    a: Assumption,
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Which poles move with an assumed number and all that the fit makes of it, or may."""
+    if not all(math.isfinite(percent) for percent in a.follows.values()):
+        return np.ones(here.size, dtype=np.bool_)
+    moved = {n: v * (1 + ASIDE * a.follows.get(n, 0.0)) for n, v in values.items()}
+    moved[a.name] = a.value + ASIDE * (a.size or abs(a.value))
+    there = _poles(rig, moved, at, still)
+    shift = np.abs(there[None, :] - here[:, None]).min(axis=1)
+    return shift > NEGLIGIBLE * ASIDE * np.maximum(np.abs(here), SPLIT * np.abs(here).max(initial=0.0))
 
 
 def _of_one_sign(value: float, stderr: float, quantile: float, unit: str) -> Estimate:

@@ -422,6 +422,13 @@ def _loop(evidence: Evidence, *, supported: bool) -> Judgement:
             question=LOOP, answer="not asked",
             headline="No equilibrium of this plant is unstable, or no drive acts on it.",
         )  # fmt: skip
+    if s.growth.rests_on:
+        on = s.growth.rests_on
+        return Judgement(
+            question=LOOP, answer="not tested",
+            headline=f"{s.at.capitalize()}, the fastest pole is not known: it rests on {', '.join(on)} (assumed).",
+            advice=f"Measure {'it' if len(on) == 1 else 'them'} before a loop is designed.",
+        )  # fmt: skip
     grows, digits = s.growth, figures(s.growth.value, s.growth.stderr)
     value, low, high = (f"{v:#.{digits}g}".rstrip(".") for v in (grows.value, *grows.interval))
     where = f"{s.at}, the fastest pole is {value} 1/s ({low} to {high})"

@@ -134,8 +134,8 @@ def _best(fit: Fit, pictures: Sequence[Picture]) -> str:
 def _findings(fit: Fit) -> Iterator[KeyNumber]:
     """The pole that a loop has to master, then what was estimated, inertias and lengths before friction."""
     poles = [p.real for p in fit.poles.get("inverted", ()) if p.real.value > 0]
-    if poles:
-        fastest = max(poles, key=lambda e: e.value)
+    fastest = max(poles, key=lambda e: e.value, default=None)
+    if fastest is not None and not fastest.rests_on:
         yield finding("unstable pole", fastest, meaning="upright")
     about = fit.model.parameters
     estimates = [(n, e) for n, e in fit.estimates.items() if e.status not in ("known", "nuisance", "left out")]

@@ -211,7 +211,9 @@ def pole_table(fit: Fit) -> Table:
             if pole.imag.value > 0:
                 value += f" ± {with_error(pole.imag.value, pole.imag.stderr)[0]} i"
                 around += f"; ± ({interval(pole.imag)}) i"
-            rows.append((at, value, around, _swing(pole)))
+            if pole.real.rests_on:
+                around = pole.real.status
+            rows.append((at, value, around, "" if pole.real.rests_on else _swing(pole)))
     return Table(
         caption="Poles [1/s]; of a conjugate pair real and imaginary part",
         headings=("equilibrium", "pole", "95 % interval", "swings at (95 % interval)"), rows=tuple(rows), numbers=(1,),
