@@ -355,7 +355,7 @@ TABLE = {  # a plant alone has no encoders, a log in N m is none of a rig that t
     "gains of chance": (lambda x: up.chance(DRIVEN, x, **SHORT), FEEDBACK),
     "play": (lambda x: up.play(x, **SHORT, **DRIVE), RIGGED),
     "simulate": (lambda x: up.simulate(x, seconds=0.1), RIGGED | LINEAR | {"sampled", "transfer"}),
-    "law of a motion": (lambda x: up.simulate(DRIVEN, x, seconds=0.1), FEEDBACK | {"law", "none"}),
+    "law of a motion": (lambda x: up.simulate(DRIVEN, x, at="inverted", seconds=0.1), FEEDBACK | {"law", "none"}),
     "gains of matrices": (lambda x: up.simulate(RIG.linear("inverted"), x, seconds=0.1), FEEDBACK | {"none"}),
     "export": (lambda x: up.export(x, to="mjcf"), RIGGED),
     "place": (lambda x: up.place(x, [-4, -5, -6, -7]), LINEAR | {"sampled"}),

@@ -107,7 +107,7 @@ def test_a_rig_behind_a_wire_is_identified_held_swung_up_and_let_swing(host, tmp
     expected = {name: s for name, s in sets.items() if s["before"]["words"]["stabilised"] >= 0.5}
     assert expected
     assert {name: (s["after"]["word"], s["after"]["ended"]) for name, s in expected.items()} == dict.fromkeys(
-        expected, ("stabilised", "")
+        expected, ("stabilised", None)
     )
 
     assert told["2b"]["swing_up"]["held"]

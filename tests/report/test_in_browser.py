@@ -56,7 +56,8 @@ def test_without_a_script_headline_picture_and_numbers_are_there(written):
     with opened(path, width=360, script=False) as (page, _):
         assert page.locator("h1").is_visible()
         chapter = told.chapters[0] if isinstance(told, Book) else told
-        assert page.locator("figure svg").first.is_visible() == any((chapter.picture, chapter.drawing))
+        shown = page.locator("figure svg:visible").count()  # a chart is drawn for a desk and for a phone
+        assert bool(shown) == any((chapter.picture, chapter.drawing))
         for number in chapter.findings[:1]:
             assert page.get_by_text(number.value).first.is_visible()
 

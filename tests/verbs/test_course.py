@@ -64,5 +64,5 @@ def test_the_shortest_experiment_is_told_as_numbers_and_page(tmp_path):
     again = lab(experiment="1a", rig="rectilinear", seed=2, out=tmp_path / "lab").experiment("1a")  # as kept
     assert again.value["k"]["value"] == k["value"]
     assert "<svg" in again.plot("line")._repr_svg_()
-    with pytest.raises(BadInput, match="experiment '1b' was not run; did you mean '1a'"):
+    with pytest.raises(BadInput, match="experiment '1b' was not run; valid names: 1a"):
         done.experiment("1b")

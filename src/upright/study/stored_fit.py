@@ -231,6 +231,9 @@ def basis_of(verdict: str, answers: Sequence[Judgement], *, trusted: bool) -> Ba
     if not trusted:
         reason = _worded(against[0]) if against else verdict or "do not rely on this model yet."
         return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {reason}")
+    loose = next((a for a in answers if a.rests_on), None)
+    if loose is not None:
+        return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {_worded(loose)}")
     less = [*against, *(a for a in answers if a.answer in ("in part", "not tested"))]
     if less:
         return Basis(level=RESERVED, sentence=f"The fit has reservations: {_worded(less[0])}")
@@ -253,7 +256,10 @@ def _answer(entry: Any) -> Judgement:
     table = _table(entry, "answers")
     question, answer, headline = (_text(table.get(n), f"answers.{n}") for n in ("question", "answer", "headline"))
     reasons = [_text(reason, "answers.reasons") for reason in _list(table.get("reasons", []), "answers.reasons")]
-    return Judgement(question=question, answer=answer, headline=headline, reasons=tuple(reasons))
+    rests = [_text(name, "answers.rests_on") for name in _list(table.get("rests_on", []), "answers.rests_on")]
+    return Judgement(
+        question=question, answer=answer, headline=headline, reasons=tuple(reasons), rests_on=tuple(rests)
+    )  # fmt: skip
 
 
 def _hardware(content: Mapping[str, Any], values: Mapping[str, float]) -> Hardware:

@@ -226,10 +226,11 @@ def _foresee(
     problem = formulate(rig, [before], stated=groups)
     x, log = problem.start, SearchLog(progress=progress)
     if x.size:
-        # how the run begins is felt at once, and later a speed that is a little off has thrown the motion out of phase
+        # how a swing begins is felt at once, and later a speed that is a little off has thrown it out of phase; what a
+        # drive spins up from rest is felt late
         early = min(track.period for track in problem.tracks) / 4
-        end = descend_progressively(problem, x, log, horizon=early, upto=upto)
-        for other in _either_side(problem):
+        end = descend_progressively(problem, x, log, upto=upto)
+        for other in (x, *_either_side(problem)):
             end = better(end, descend_progressively(problem, other, log, horizon=early, upto=upto))
         if end.interrupted:
             raise KeyboardInterrupt

@@ -427,7 +427,7 @@ def _loop(evidence: Evidence, *, supported: bool) -> Judgement:
         return Judgement(
             question=LOOP, answer="not tested",
             headline=f"{s.at.capitalize()}, the fastest pole is not known: it rests on {', '.join(on)} (assumed).",
-            advice=f"Measure {'it' if len(on) == 1 else 'them'} before a loop is designed.",
+            advice=f"Measure {'it' if len(on) == 1 else 'them'} before a loop is designed.", rests_on=on,
         )  # fmt: skip
     grows, digits = s.growth, figures(s.growth.value, s.growth.stderr)
     value, low, high = (f"{v:#.{digits}g}".rstrip(".") for v in (grows.value, *grows.interval))

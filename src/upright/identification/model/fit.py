@@ -99,7 +99,8 @@ class Assumption:
 class Judgement:
     """One of the questions that a verdict answers: "yes", "in part", "no", "not tested" or "not asked".
 
-    The headline says it with its numbers, `advice` what to do, `reasons` why.
+    The headline says it with its numbers, `advice` what to do, `reasons` why. It would be another with other values of
+    the assumed numbers that it `rests_on`.
     """
 
     question: str
@@ -107,6 +108,7 @@ class Judgement:
     headline: str
     advice: str = ""
     reasons: tuple[str, ...] = ()
+    rests_on: tuple[str, ...] = ()
 
     def text(self) -> str:
         """All of it, the headline first."""
