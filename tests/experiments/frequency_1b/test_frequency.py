@@ -347,7 +347,7 @@ def test_the_page_says_what_was_found(furuta):
     assert told.numbers["pole"]["inside"]
     assert "unstable pole" in told.verdict
     pictures = [b for part in told.parts for b in part.content if isinstance(b, Picture)]
-    assert len(pictures) == len(furuta.answer.response.outputs) + 1  # a Bode plot of each, and what the points are worth
+    assert len(pictures) == len(furuta.answer.used.outputs) + 1  # a Bode plot of each, and what the points are worth
 
 
 @pytest.mark.slow
