@@ -231,7 +231,8 @@ def _foresee(
         early = min(track.period for track in problem.tracks) / 4
         end = descend_progressively(problem, x, log, upto=upto)
         for other in (x, *_either_side(problem)):
-            end = better(end, descend_progressively(problem, other, log, horizon=early, upto=upto))
+            if not end.interrupted:
+                end = better(end, descend_progressively(problem, other, log, horizon=early, upto=upto))
         if end.interrupted:
             raise KeyboardInterrupt
         if math.isinf(upto):  # else what is scored must not weigh
