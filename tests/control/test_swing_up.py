@@ -203,6 +203,7 @@ def test_a_designed_swing_up_is_not_stopped_where_one_for_the_whole_travel_is(ma
 
 
 @pytest.mark.parametrize("make", MAKES)
+@pytest.mark.slow
 def test_a_swing_up_that_is_stopped_at_any_moment_ends_within_its_travel(make):
     rng = np.random.default_rng(4)
     for moment in rng.uniform(0.5, 4.0, 4):
@@ -211,6 +212,7 @@ def test_a_swing_up_that_is_stopped_at_any_moment_ends_within_its_travel(make):
         assert far <= TIGHT[make][0], moment
 
 
+@pytest.mark.slow
 def test_where_no_swing_up_can_be_stopped_in_time_a_sentence_says_what_is_missing():
     rig = make_rig("linear")
     with pytest.raises(BadInput, match=r"with 0\.\d+ m/s, of 0\.2, .* allow more travel or speed"):

@@ -50,6 +50,7 @@ def test_half_a_supply_is_named_and_a_law_for_what_it_gives_stands(tmp_path):
     [({"drive": -1}, "motor leads swapped"), ({"psi": -1}, "encoder channels of psi swapped"),
      ({"theta": 0.5}, "theta: counts per turn 8000, not 16000")],
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_rig_that_is_wired_otherwise_than_described_is_not_swung_up(tmp_path, faults, cause):
     result = run_quick(live_stand(described(tmp_path, **faults)), tmp_path / "out")
     assert result.refused == cause
