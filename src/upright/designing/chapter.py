@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from upright.basis import in_percent
+from upright.basis import NOT_TRUSTED, in_percent
 from upright.control.effort import shown
 from upright.designing.run import Designed, Holding, VelocityLoop
 from upright.gains.loop import response
@@ -288,6 +288,11 @@ def _dead_zone(design: Designed) -> str:
 def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
     """What to try after this design."""
     steps: list[Step] = []
+    if design.basis.level == NOT_TRUSTED:
+        steps.append(
+            Step("Mend the model first: do what its own verdict asks for, and identify again.",
+                 "upright identify STUDY.toml -o OUT")
+        )  # fmt: skip
     plain_matrices = isinstance(design.rig, StateSpace)
     base = f"upright design {source}" + ("" if plain_matrices else f" --at {design.request.at}")
     if design.sampled_gains is not None and (design.chosen.margins is None or design.chosen.margins.modulus < 0.4):

@@ -233,7 +233,7 @@ def basis_of(verdict: str, answers: Sequence[Judgement], *, trusted: bool) -> Ba
         return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {reason}")
     loose = next((a for a in answers if a.rests_on), None)
     if loose is not None:
-        return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {_worded(loose)}")
+        return Basis(level=NOT_TRUSTED, sentence=f"The fit's own verdict: {_worded(loose)} Measure what it rests on.")
     less = [*against, *(a for a in answers if a.answer in ("in part", "not tested"))]
     if less:
         return Basis(level=RESERVED, sentence=f"The fit has reservations: {_worded(less[0])}")
