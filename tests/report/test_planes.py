@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -156,3 +157,16 @@ def test_only_the_upper_half_is_drawn_with_every_set_in_its_own_mark():
 def test_a_design_draws_its_poles_its_loop_and_the_way_back(done):
     assert list(pictures(done)) == ["poles", "loop", "swing"]
     assert type(up.design(FALLING, poles="-6+-3j", period=PERIOD).plot("loop")).__name__ == "Chart"
+
+
+def test_a_pole_that_rests_on_an_assumed_number_has_no_interval_in_the_picture():
+    seen, rests = (
+        Estimate.within(-2.0, 0.1, 0.2),
+        replace(Estimate.within(5.0, 0.1, 0.2), rests_on=("r",), status="rests on r"),
+    )
+    still = Estimate.within(0.0, 0.0, 0.0)
+    chart = fitted_poles_chart({"inverted": [Pole(real=e, imag=still) for e in (rests, seen)]})
+    (line,) = chart.panels[0].lines
+    assert line.notes[0] == "rests on r"
+    assert line.across is not None
+    assert [ends.tolist() for ends in line.across] == [[5.0, -2.2], [5.0, -1.8]]

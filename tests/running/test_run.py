@@ -162,11 +162,16 @@ def test_it_runs_in_a_process_of_its_own_just_the_same(folder, tmp_path):
     assert own.log_path != inline.log_path
 
 
+def run_within(travel, folder, at, *, tilt):
+    """A run of the law from a tilt, where the arm may go so far."""
+    text = f'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "{travel}"\n'
+    (at / "RIG.toml").write_text(text, encoding="utf-8")
+    order = RunRequest(rig=at / "RIG.toml", law=folder / "design.json", seconds=2.0, tilt=tilt, check=False)
+    return run_rig(order, at)
+
+
 def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
-    text = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "3 deg"\n'
-    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
-    wish = RunRequest(rig=tmp_path / "RIG.toml", law=folder / "design.json", seconds=2.0, tilt=0.08, check=False)
-    done = run_rig(wish, tmp_path)
+    done = run_within("3 deg", folder, tmp_path, tilt=0.08)
     assert done.end.faults & Fault.OVERTRAVEL
     assert "travel" in done.verdict
     assert not done.sound
@@ -176,10 +181,7 @@ def test_a_limit_ends_a_run_and_the_verdict_says_which(folder, tmp_path):
 
 def test_the_samples_of_a_braked_run_are_in_its_log_and_are_not_its_law_s(folder, tmp_path):
     """Let go where its law drives it out, it is braked to rest: output against speed, until the log ends."""
-    text = 'kind = "twin"\nmake = "furuta"\n[limits]\ncommand = "5 V"\n[limits.psi]\ntravel = "0.8 rad"\n'
-    (tmp_path / "RIG.toml").write_text(text, encoding="utf-8")
-    order = RunRequest(rig=tmp_path / "RIG.toml", law=folder / "design.json", seconds=2.0, tilt=0.12, check=False)
-    done = run_rig(order, tmp_path)
+    done = run_within("0.8 rad", folder, tmp_path, tilt=0.12)
     assert done.end.faults & Fault.OVERTRAVEL
     log = done.log
     braked = np.flatnonzero(log.columns["mode"] == BRAKING)

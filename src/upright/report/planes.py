@@ -10,7 +10,7 @@ import numpy as np
 
 from upright.gains.margins import Margins, Response
 from upright.gains.requests import Roots, matched
-from upright.identification.model.fit import Pole
+from upright.identification.model.fit import Estimate, Pole
 from upright.records import Array
 from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.symbols import number
@@ -77,9 +77,11 @@ def fitted_poles_chart(fitted: Mapping[str, Sequence[Pole]]) -> Chart:
     lines: list[ChartLine] = []
     for (at, poles), mark, colour in zip(fitted.items(), "xosD^+" * 4, ("q0", "q1", "q2", "q3") * 6, strict=False):
         values: Roots = np.array([complex(p.real.value, p.imag.value) for p in poles])
-        ends = [np.array([p.real.interval for p in poles]).T, np.array([p.imag.interval for p in poles]).T]
+        ends = [np.array([_ends(e) for e in part]).T for part in ([p.real for p in poles], [p.imag for p in poles])]
         notes = tuple(
-            f"95 % {number(p.real.interval[0], 3)} to {number(p.real.interval[1], 3)} 1/s"
+            p.real.status
+            if p.real.rests_on
+            else f"95 % {number(p.real.interval[0], 3)} to {number(p.real.interval[1], 3)} 1/s"
             + (f", ± {number(p.imag.interval[0], 3)} to {number(p.imag.interval[1], 3)} rad/s" if p.imag.value else "")
             for p in poles
         )
@@ -89,6 +91,11 @@ def fitted_poles_chart(fitted: Mapping[str, Sequence[Pole]]) -> Chart:
         )  # fmt: skip
     every = np.concatenate([line.x + 1j * line.y for line in lines]).astype(np.complex128)
     return _plane({"imaginary part": lines}, *_view(every))
+
+
+def _ends(e: Estimate) -> tuple[float, float]:
+    """Of the interval; none where the pole rests on assumed numbers."""
+    return (e.value, e.value) if e.rests_on else e.interval
 
 
 def pole_panels(sets: Mapping[str, Sequence[Poles]], left: float, right: float, high: float) -> Chart:

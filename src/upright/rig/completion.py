@@ -35,7 +35,7 @@ def completed(
     who : str
         Verb that asks.
     form : str
-        How its caller gives a number by name: an option, an argument ``"{}={}"``; empty where only files say it.
+        How its caller gives a number by name; empty where only files say it.
 
     Raises
     ------

@@ -106,7 +106,7 @@ class StoredPicture(str):
     """SVG of a picture that an earlier run drew; a notebook shows it."""
 
     def _repr_svg_(self) -> str:
-        first, end, _ = self.removeprefix('<div class="chart">').partition("</svg>")  # of a chart that for a desk
+        first, end, _ = self.removeprefix('<div class="chart">').partition("</svg>")  # of a chart, the one for a desk
         return first + end
 
 

@@ -77,21 +77,23 @@ def poles(
                     moved = _poles(rig, {**values, name: values[name] + step}, at, still)
                     nearest = np.abs(moved[None, :] - here[:, None]).argmin(axis=1)
                     slope[:, i] = (moved[nearest] - here) / step
-            rests = [a.name for a in assumed], [_follow(rig, values, at, still, here, a) for a in assumed]
+            follows = [_follow(rig, values, at, still, here, a) for a in assumed]
         except (ImpossiblePhysics, NotIdentifiable):
             continue
         errors = [
             np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", part, covariance, part), 0.0))
             for part in (slope.real, slope.imag)
         ]
+        resting = [
+            tuple(a.name for a, moves in zip(assumed, follows, strict=True) if moves[i]) for i in range(here.size)
+        ]
         out[f"{at}, {' and '.join(sorted(still))} held" if still else at] = tuple(
             Pole(
                 real=_resting(_of_one_sign(float(p.real), float(a), quantile, "1/s"), on),
                 imag=_resting(_of_one_sign(float(p.imag), float(b), quantile, "rad/s"), on),
             )
-            for i, (p, a, b) in enumerate(zip(here, *errors, strict=True))
+            for p, a, b, on in zip(here, *errors, resting, strict=True)
             if p.imag >= 0
-            for on in [tuple(name for name, follows in zip(*rests, strict=True) if follows[i])]
         )
     return out
 

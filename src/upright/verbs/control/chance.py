@@ -80,7 +80,7 @@ def chance(
     shared = Workers.of(workers)
     known = rig_of(fit, "chance", seed=seed, draws=draws)
     entries = rig_entries(known.plant, known.unit, on)
-    rig = completed(known, entries, vendor=on.get("vendor"), who="chance", form="{}={}")
+    rig = completed(known, entries, vendor=on.get("vendor"), who="chance")
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
