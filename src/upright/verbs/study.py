@@ -13,12 +13,14 @@ if TYPE_CHECKING:
 
 def read_study(study: Path, folder: Path, data: Path | None) -> Study:
     """A study, once study and folder of the results are what they should be."""
+    from upright.readers.source import neighbour
     from upright.report.symbols import typed
     from upright.study.load import load_study
 
     if not study.exists():
         raise BadInput(
-            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+            f"There is no study '{study}';{neighbour(study)} "
+            f"`upright init LOG -o {typed(study.name)}` writes one from a log"
         )
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")

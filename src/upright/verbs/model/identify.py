@@ -176,7 +176,7 @@ def identify(
 
     folder, shared = folder_if_given(out, pdf), Workers.of(workers)
     if method not in METHODS:
-        raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
+        raise BadInput(f"--method is how to search, and there is no '{method}'; {nearest(method, METHODS)}")
     options = known_options(LogOptions, of_log, "identify")
     requested = requested_study(study, plant, verb="identify", data=data, **options)
     label = requested.path
