@@ -406,8 +406,6 @@ def _pushed(t: Array, u: Array, x: Array) -> float:
     push = savitzky_golay(np.interp(grid, t, u), step, width).q
     both = np.column_stack([push, motion.q, motion.v, np.sign(motion.v), np.ones_like(push)])[width:-width]
     a = motion.a[width:-width]
-    if not both[:, 0].any():
-        return 0.0
     pushed, alone = LeastSquares.of(both, a), LeastSquares.of(both[:, 1:], a)
     return float(pushed.slopes[0]) if pushed.squares < CLEAR * alone.squares else 0.0
 
