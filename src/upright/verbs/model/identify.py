@@ -16,10 +16,11 @@ from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log, texts
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.physics import Plant
     from upright.rig import Rig
     from upright.study.load import Study
-    from upright.verbs.values import Workforce
+    from upright.verbs.values import PlantLike, StudyLike, Workforce
 
 from upright.verbs.model.fit import FitAnswer
 from upright.verbs.options import known_options
@@ -121,9 +122,10 @@ def _keys() -> str:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def identify(
-    study: Any, plant: Any = None, *, data: str | Path | None = None, hold_out: Sequence[str] | str | None = None,
-    method: str = "auto", out: str | Path | None = None, report: bool = True, pdf: bool = False,
-    workers: Workforce = 1, progress: Progress = silent, **of_log: Unpack[LogOptions],
+    study: StudyLike, plant: PlantLike | None = None, *, data: PathLike | None = None,
+    hold_out: Sequence[str] | str | None = None, method: str = "auto", out: PathLike | None = None,
+    report: bool = True, pdf: bool = False, workers: Workforce = 1, progress: Progress = silent,
+    **of_log: Unpack[LogOptions],
 ) -> FitAnswer:  # fmt: skip
     """Fit a rig's parameters to its logs as a study file says; write estimates and report.
 
@@ -209,7 +211,7 @@ def identify(
             write_fit(fit, requested, written[0], crossed)
     page = chapter(
         fit, title=requested.title or requested.path.stem.replace("_", " "), provenance=requested.provenance,
-        crossed=crossed, study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
+        crossed=crossed, study=typed(label) + (f" --data {typed(Path(data))}" if data is not None else ""),
         folder=typed(folder) if folder is not None else "OUT", windows=windows(requested.runs),
     )  # fmt: skip
     page = replace(page, numbers=fit_content(fit, requested, crossed))
@@ -223,7 +225,7 @@ def identify(
 
 
 def requested_study(
-    source: Any, plant: Any = None, *, verb: str, folder: Path | None = None, data: str | Path | None = None,
+    source: Any, plant: Any = None, *, verb: str, folder: Path | None = None, data: PathLike | None = None,
     **options: Any,
 ) -> Study:  # fmt: skip
     """The study that was handed in, or the one that a log and what is known of its rig make."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs
@@ -19,8 +18,9 @@ from upright.verbs.pages import pdf_has_folder, write_page
 from upright.verbs.study import folder_beside
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.identification.ladder.growth import Ladder
-    from upright.verbs.values import Workforce
+    from upright.verbs.values import PlantLike, StudyLike, Workforce
 
 
 @command(
@@ -54,8 +54,8 @@ if TYPE_CHECKING:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def ladder(
-    study: Any, plant: Any = None, *, out: str | os.PathLike[str] | None = None,
-    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
+    study: StudyLike, plant: PlantLike | None = None, *, out: PathLike | None = None,
+    data: PathLike | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
     progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> Answer[Ladder]:  # fmt: skip
     """Add terms to a model only while it predicts unseen runs better.
