@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from upright.report.page import Step
     from upright.rig import Rig
     from upright.study.sensors import Wiring
-    from upright.verbs.values import Log, PlantLike
+    from upright.verbs.forms import PlantLike
+    from upright.verbs.values import Log
 
 
 def read(file: Log, *, reader: str | None = None, time_unit: str | None = None) -> Record:

@@ -23,7 +23,7 @@ from upright.verbs.options import MotionOptions, known_options
 if TYPE_CHECKING:
     from upright.rig import Rig
     from upright.systems import LinearForm, StateSpace
-    from upright.verbs.values import LawLike, RigLike
+    from upright.verbs.forms import LawLike, RigLike
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from upright.control.preflight import Preflight
+    from upright.verbs.forms import RigLike
     from upright.verbs.linear.feedback import Gains
-    from upright.verbs.values import RigLike, Workforce
+    from upright.verbs.values import Workforce
 
 UNSUPPORTED = (
     "The probability of stabilisation is not supported: it would be that of the model, and the rig is not known to be "

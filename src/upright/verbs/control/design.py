@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from upright.report.page import Part
     from upright.rig import Rig
     from upright.systems import LinearForm, StateSpace
-    from upright.verbs.values import RigLike
+    from upright.verbs.forms import RigLike
 
 _poles = read_pole_list  # the verbs have options of this name
 

@@ -13,7 +13,7 @@ from upright.verbs.options import TrialOptions
 
 if TYPE_CHECKING:
     from upright.files import PathLike
-    from upright.verbs.values import RigLike, StudyLike
+    from upright.verbs.forms import RigLike, StudyLike
 
 
 @command(

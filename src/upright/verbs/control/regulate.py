@@ -20,7 +20,8 @@ from upright.verbs.values import read_pole_list, read_start
 if TYPE_CHECKING:
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
     from upright.files import PathLike
-    from upright.verbs.values import RigLike, Workforce
+    from upright.verbs.forms import RigLike
+    from upright.verbs.values import Workforce
 
 _poles = read_pole_list  # the verbs have options of this name
 

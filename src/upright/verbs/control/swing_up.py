@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from upright.experiments.swing_up_2b.run import SwingUpRun
     from upright.files import PathLike
     from upright.rig import Rig
-    from upright.verbs.values import Log, RigLike
+    from upright.verbs.forms import RigLike
+    from upright.verbs.values import Log
 
 
 @command(

@@ -20,7 +20,7 @@ from upright.verbs.values import read_pole_list, si_if_given
 if TYPE_CHECKING:
     from upright.experiments.tracking_3.run import Tracking
     from upright.files import PathLike
-    from upright.verbs.values import RigLike
+    from upright.verbs.forms import RigLike
 
 _poles = read_pole_list  # the verbs have options of this name
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from upright.experiments.swing_up_2b.run import SwingUpRun
     from upright.files import PathLike
     from upright.laws import Law, Rule
-    from upright.verbs.values import RigLike
+    from upright.verbs.forms import RigLike
 
 
 @command(

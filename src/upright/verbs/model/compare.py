@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from upright.identification.model.runs import Run
     from upright.report.fit.compare import ComparedRun, Comparison
     from upright.study.stored_fit import StoredFit
-    from upright.verbs.values import FitLike, StudyLike
+    from upright.verbs.forms import FitLike, StudyLike
 
 LEAD = 0.4
 """Share of a run after which fits may look at it for its start state; from its half on they predict."""

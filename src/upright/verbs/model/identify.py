@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from upright.physics import Plant
     from upright.rig import Rig
     from upright.study.load import Study
-    from upright.verbs.values import PlantLike, StudyLike, Workforce
+    from upright.verbs.forms import PlantLike, StudyLike
+    from upright.verbs.values import Workforce
 
 from upright.verbs.model.fit import FitAnswer
 from upright.verbs.options import known_options

@@ -20,7 +20,8 @@ from upright.verbs.study import folder_beside
 if TYPE_CHECKING:
     from upright.files import PathLike
     from upright.identification.ladder.growth import Ladder
-    from upright.verbs.values import PlantLike, StudyLike, Workforce
+    from upright.verbs.forms import PlantLike, StudyLike
+    from upright.verbs.values import Workforce
 
 
 @command(

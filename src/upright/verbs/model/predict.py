@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from upright.identification.inference.scoring import RunScore
     from upright.study.load import Study
     from upright.study.stored_fit import StoredFit
-    from upright.verbs.values import FitLike, StudyLike
+    from upright.verbs.forms import FitLike, StudyLike
 
 
 @command(
