@@ -12,7 +12,6 @@ from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.command import Flag, command
-from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log, texts
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ class LogOptions(TypedDict, total=False):
 def _read_first(typed: dict[str, Any]) -> dict[str, Any]:
     """What was typed, with the study read: a command takes no log, and has its folder beside the study."""
     folder = typed["out"] if typed["out"] is not None else folder_beside(typed["study"], "fit")
-    return {**typed, "study": read_study(typed["study"], folder, typed["data"]), "out": folder}
+    return {**typed, "study": _read_study(typed["study"], folder, typed["data"]), "out": folder}
 
 
 def _keys() -> str:
@@ -242,7 +241,7 @@ def requested_study(
             raise BadInput(f"{name} belongs to a log; the study says it itself, so change it there.")
         if isinstance(source, Study):
             return source
-        return read_study(Path(source), folder or Path(), None if data is None else Path(data))
+        return _read_study(Path(source), folder or Path(), None if data is None else Path(data))
     from upright.study.draft.from_record import study_of_record
 
     known: Any = options.get("known")
@@ -280,3 +279,30 @@ def _what_moves(plant: Any, verb: str) -> type[Plant] | Rig | None:
 
 def _is_study(path: Path) -> bool:
     return path.suffix.lower() in (".toml", "")
+
+
+def _read_study(study: Path, folder: Path, data: Path | None) -> Study:
+    """A study, once study and folder of the results are what they should be."""
+    from upright.report.symbols import typed
+    from upright.study.load import load_study
+
+    if not study.exists():
+        raise BadInput(
+            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+        )
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
+    return load_study(study, data=data)
+
+
+def folder_beside(study: Path, what: str) -> Path:
+    """Folder of results beside a study and called after it, ``crane-fit``.
+
+    Raises
+    ------
+    BadInput
+        When the study is a folder.
+    """
+    if study.is_dir():
+        raise BadInput(f"'{study}' is a folder, and a study is a TOML file; name the file inside it.")
+    return study.with_name(f"{study.stem}-{what}")

@@ -12,10 +12,9 @@ from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.model.identify import LogOptions, requested_study
+from upright.verbs.model.identify import LogOptions, folder_beside, requested_study
 from upright.verbs.options import known_options
 from upright.verbs.pages import pdf_has_folder, write_page
-from upright.verbs.study import folder_beside
 
 if TYPE_CHECKING:
     from upright.files import PathLike
