@@ -27,7 +27,7 @@ METAVARS = {
 }  # fmt: skip
 HELPS = {
     "pdf": "Write the page as PDF too (pdf extra).",
-    "workers": "Who shares the work: N processes of this machine, or a Dask scheduler, tcp://host:8786.",
+    "workers": "Share the work among N processes of this machine, or a Dask scheduler, tcp://host:8786.",
 }
 RANGES = {"seed": (0, None)}
 
@@ -117,7 +117,7 @@ def _kind(parameter: inspect.Parameter) -> Any:
     for kind in (bool, int, float):
         if isinstance(default, kind):
             return kind
-    if re.search(r"Path|\bLog\b", text) or (text == "Any" and not isinstance(default, str)):
+    if re.search(r"Path|\bLog\b|(Rig|Fit|Study)Like", text):
         return Path
     return next((kind for kind in (str, float, int, bool) if re.search(rf"\b{kind.__name__}\b", text)), str)
 

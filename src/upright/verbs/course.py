@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
@@ -18,6 +18,7 @@ from upright.progress import Progress, silent
 from upright.renamed import WORN, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.options import LabOptions, known_options
 from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import texts
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from upright.experiments.laboratory import Session
     from upright.experiments.stand.live import LiveStand
+    from upright.files import PathLike
     from upright.paper.reproduce import Reproduced
     from upright.questionnaire.sheet import Means, Ratings, Shares
     from upright.realtime.session import RunState
@@ -71,7 +73,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     names={"experiment": "--experiment -e", "rig": "--rig", "nonideal": "--nonideal --worn"},
     metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml", "accept": "REASON"},
     helps={
-        "experiment": "Only this one, and what it stands on.",
+        "experiment": "Only this one, and those it depends on.",
         "rig": "linear, furuta, rectilinear or torsional, else the paper's; or RIG.toml.",
         "nonideal": "Rigs with unmodelled effects: stiction, ripple and play.",
     },
@@ -82,7 +84,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml they are made on the rig itself; you are prompted for what no drive can do.
+    With a RIG.toml they run on the rig itself; you are prompted for what the drive cannot do.
 
     upright lab
     upright lab --rig linear --seed 3
@@ -94,48 +96,42 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 )
 @renamed(WORN)
 def lab(
-    *, experiment: Sequence[str] | str | None = None, rig: str | None = None, seed: int = 0,
-    out: str | os.PathLike[str] | None = None, fresh: bool = False, quick: bool = False, workers: Workforce = 1,
-    nonideal: bool = False, accept: str | None = None, progress: Progress = silent,
+    *, experiment: Sequence[str] | str | None = None, rig: str | None = None, out: PathLike | None = None,
+    fresh: bool = False, quick: bool = False, workers: Workforce = 1, progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
+    **on: Unpack[LabOptions],
 ) -> Answer[Laboratory]:  # fmt: skip
     """Run the paper's experiments, on simulated rigs or on hardware, and write one report.
 
-    Or on hardware: identify, flip, design, hold, swing, report. Every log, study and fit is written to the folder
-    for the other verbs, and one report.html tells it all (report.pdf with the pdf extra). Ctrl-C keeps and reports what
-    is there; the same call goes on from there.
+    Every log, study and fit is written to the folder, where the other commands read them; report.html has all results
+    (report.pdf with the pdf extra). Ctrl-C keeps and reports what is finished; the same call continues from there.
 
     Parameters
     ----------
     experiment : str or sequence of str, optional
-        Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
+        Only these of 1, 1a, 1b, 2, 2b, 3, 4, and those they depend on.
     rig : str, optional
-        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
+        Twin of a rig model, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
-    seed : int
-        Random seed of the rig model; 0 is nominal. On hardware, that of the rigs drawn from its fit.
     out : path, optional
         Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
-        Make again what the folder holds already.
+        Run again what the folder has already.
     quick : bool
-        Instead of experiments a minute at the rig of RIG.toml, without hands: how it is wired, dead zone, drive and
-        delay, a fit, gains, swing-up and catch.
+        A minute at the rig of RIG.toml instead of the experiments, without hands: wiring, dead zone, drive and delay, a
+        fit, gains, swing-up and catch.
     workers : int, str or executor
-        Who runs experiments that need nothing of each other: processes of this machine, the address of a Dask
+        Number of processes for independent experiments, the address of a Dask
         scheduler, or an executor of `concurrent.futures`.
-    nonideal : bool
-        Twins with physics that models leave out, of which fits read as those of real rigs do.
-    accept : str, optional
-        Why laws from a fit that is not trusted drive hardware all the same; the logs keep it. Without it such laws are
-        not armed.
     progress : callable, optional
         Called with the current step and the share completed.
     ask : callable, optional
         Asks the person beside a rig for something, in a sentence; answers whether it was done. Hardware needs it.
     watching : callable, optional
         Opens a view for each run at a rig: shown how it goes, it answers with a sentence to end the run.
+    **on
+        Of the rig: seed, nonideal, accept; see `LabOptions`.
 
     Returns
     -------
@@ -149,11 +145,13 @@ def lab(
     """
     from upright.rig.makes import make_named
 
+    on = known_options(LabOptions, on, "lab")
+    seed, nonideal, accept = on.get("seed", 0), on.get("nonideal", False), on.get("accept")
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
     rig = os.fspath(rig) if isinstance(rig, os.PathLike) else "" if rig is None else rig
     if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
-        raise BadInput(f"a laboratory's rig is a make, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
+        raise BadInput(f"a laboratory's rig is a rig model, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
     itself = rig.endswith(".toml") or rig.startswith("serial:")
     if rig and not itself:
         make_named(rig)
@@ -237,7 +235,7 @@ def _live(
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
-        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
+        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a rig model: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
         raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")
@@ -274,7 +272,7 @@ def _ctrl_c() -> Generator[_Pressed]:
 
 @command("Course", defaults={"out": "."}, more="upright reproduce -o out")
 def reproduce(
-    *, seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False
+    *, seed: int = 0, out: PathLike | None = None, pdf: bool = False
 ) -> Answer[Reproduced]:  # fmt: skip
     """Regenerate the paper's pole tables from a few numbers, and show its misprints.
 
@@ -317,8 +315,8 @@ def reproduce(
 )
 @keeps_its_inputs
 def survey(
-    file: str | os.PathLike[str] | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    file: PathLike | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
+    out: PathLike | None = None, pdf: bool = False,
 ) -> Answer[Ratings | Means | Shares]:  # fmt: skip
     """Evaluate ratings before and after a course, or check printed means and percentages.
 

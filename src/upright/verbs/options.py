@@ -27,7 +27,7 @@ Options = TypeVar("Options", bound=Mapping[str, Any])
 
 
 class RigOptions(TypedDict, total=False):
-    """What a rig is that neither its study nor its data sheet says, or says otherwise.
+    """Properties of a rig that its study and data sheet leave out, or that replace theirs.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class RigOptions(TypedDict, total=False):
     counts : float, str, sequence or mapping, optional
         Encoder counts per turn or metre, "4096", "20000, 4096" or "x=20000, theta=4096"; the study's when omitted.
     vendor : str, optional
-        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
+        Data sheet for what neither the call nor the study states: "ECP 205" or "ECP 210".
     """
 
     limit: float | str | None
@@ -53,7 +53,7 @@ class TravelOptions(RigOptions, total=False):
     Parameters
     ----------
     travel : float or str, optional
-        How far the driven body may go either way, "30 cm", "120 deg" or a number [m or rad]; the study's when omitted.
+        Travel of the driven body either way, "30 cm", "120 deg" or a number [m or rad]; the study's when omitted.
     """
 
     travel: float | str | None
@@ -65,9 +65,9 @@ class LoopOptions(RigOptions, total=False):
     Parameters
     ----------
     speed : str, optional
-        Velocities by plain or filtered difference, or kalman; filtered when omitted.
+        Velocity estimator: plain or filtered difference, or kalman; filtered when omitted.
     memory : float, optional
-        Of the filtered difference, 0 to 1; 0.5 when omitted.
+        Coefficient of the filtered difference, 0 to 1; 0.5 when omitted.
     """
 
     speed: str | None
@@ -84,8 +84,8 @@ class TrialOptions(HoldingOptions, total=False):
     Parameters
     ----------
     start : str or mapping, optional
-        Of the pendulum when it is let go, from upright and outwards: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}``
-        [SI]; 5 degrees at rest, or what its rig model says, when omitted.
+        Start of the pendulum, from upright and moving outwards: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}``
+        [SI]; 5 degrees at rest, or the rig model's own start, when omitted.
     seconds : float, optional
         Length of a run; 6 when omitted, 3 in a page.
     draws : int, optional
@@ -97,22 +97,66 @@ class TrialOptions(HoldingOptions, total=False):
     draws: int
 
 
+class MotionOptions(TypedDict, total=False):
+    """What a motion has of a rig that the rig does not say, or says otherwise.
+
+    Parameters
+    ----------
+    limit : float or str, optional
+        Largest command; the rig's when omitted, none of a plant alone.
+    counts : float or mapping of coordinate to float, optional
+        Encoder counts per turn or metre; the rig's when omitted, and readings of a plant alone are not rounded.
+    memory : float, optional
+        Of the low pass on the differences, 0 to below 1; 0 when omitted.
+    actuator : mapping, optional
+        Numbers of the drive, such as ``{"gain": 0.5, "lag": 2e-3, "delay": 1e-3}``.
+    """
+
+    limit: float | str | None
+    counts: float | Mapping[str, float] | None
+    memory: float
+    actuator: Mapping[str, float] | None
+
+
 class RunOptions(TypedDict, total=False):
     """How a law runs on a rig.
 
     Parameters
     ----------
     reference : str, optional
-        A signal as of `excite`, for the coordinate that the law's design tracks [rad or m].
+        Signal that the tracked coordinate follows, written as for `excite` [rad or m].
+    start : str or mapping, optional
+        Deviation of a twin's last coordinate when it is released, ``"5 deg"``; a number is [rad or m]. Under a law 3
+        degrees, or 3 mm, when omitted.
     mode : str, optional
         ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
     accept : str, optional
-        Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
-        not armed.
+        Reason for running a law on hardware although its model is not trusted; stored in the log. Without it such a law
+        is not armed.
     """
 
+    start: Start | None
     reference: str | None
     mode: str | None
+    accept: str | None
+
+
+class LabOptions(TypedDict, total=False):
+    """What the rigs of a laboratory are.
+
+    Parameters
+    ----------
+    seed : int, optional
+        Random seed of the rig model, 0 when omitted, the nominal one; on hardware, of the rigs drawn from its fit.
+    nonideal : bool, optional
+        Twins with physics that models leave out, of which fits read as those of real rigs do.
+    accept : str, optional
+        Reason for running laws on hardware although their fit is not trusted; stored in the logs. Without it such laws
+        are not armed.
+    """
+
+    seed: int
+    nonideal: bool
     accept: str | None
 
 
@@ -122,14 +166,14 @@ class DesignOptions(LoopOptions, total=False):
     Parameters
     ----------
     effort_weight : float, optional
-        Weight of the effort; the limit decides when omitted.
+        Weight of the effort; set by the limit when omitted.
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool, optional
-        Gains whose sampled loop has the requested poles.
+        Place the poles of the sampled loop instead of the continuous one.
     delay : float, optional
-        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
-        matrices hold their own.
+        Total delay of the command in samples; when omitted the fit's, or one sample if it has none. StateSpace matrices
+        have their own.
     lag : float or str, optional
         Lag of the drive [s]; the fit's when omitted.
     """

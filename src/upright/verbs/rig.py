@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -18,6 +17,7 @@ from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import Start, path_of, read_start
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.realtime.jitter import Jitter
     from upright.realtime.session import RunState
     from upright.running.doctor import Checkup
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     "Control",
     names={"rig": "--rig", "start": "--start --tilt"},
     metavars={
-        "rig": "RIG.toml", "law": "GAIN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
+        "rig": "RIG.toml", "law": "DESIGN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
         "start": "ANGLE", "accept": "REASON",
     },
     helps={
-        "rig": "What the rig is, and how far it may go.",
-        "law": "Law to run: design.json of upright design.",
-        "reference": 'That the law follows: "square 0.3 8".',
-        "duration": "How long.",
+        "rig": "Description and limits of the rig.",
+        "law": "Law to run: design.json of `upright design`.",
+        "reference": 'Signal that the law follows: "square 0.3 8".',
+        "duration": "Length of the run.",
     },
     wrong=lambda answer: not answer.value.sound,  # whether it ran, whatever its model is worth
     more="""
-    Space, q, Esc or Ctrl-C stop it: zero first.
+    Space, q, Esc or Ctrl-C stop it; the command goes to zero first.
     This is software, not a rated safety function: keep a stop in hardware within reach.
 
     upright run --rig RIG.toml --law design/design.json --duration 30
@@ -49,16 +49,15 @@ if TYPE_CHECKING:
 @renamed({"tilt": ("start", lambda value: value)})
 @keeps_its_inputs
 def run(
-    rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str | None = None,
-    duration: float = 30.0, start: Start | None = None, check: bool = True, watch: bool = True,
-    out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
+    rig: PathLike, *, law: PathLike | None = None, excite: str | None = None,
+    duration: float = 30.0, check: bool = True, watch: bool = True,
+    out: PathLike = "upright-run", pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "", **on: Unpack[RunOptions],
 ) -> Answer[RigRun]:  # fmt: skip
-    """Run a law, or a signal, on a rig: supervised, watched, logged, judged.
+    """Run a law or a signal on a rig, supervised and logged, and evaluate the run.
 
-    The encoders are zeroed where the rig hangs, a small pulse is compared with the model, then you bring it where it is
-    to be held. A rig of hardware runs by the clock on the wall in a process of its own; twins and replays in virtual
-    time.
+    The encoders are zeroed while the rig hangs, a small pulse is compared with the model, then you move it to where it
+    is to be stabilised. Hardware runs in real time in a process of its own; twins and replays in virtual time.
 
     Parameters
     ----------
@@ -67,17 +66,14 @@ def run(
     law : path, optional
         design.json of `design`.
     excite : str, optional
-        Instead of a law, a signal put out blindly: ``"free"``, ``"step 0.5"``, ``"square 0.5 2"``, ``"sine 0.5 1.2"``,
+        Open-loop signal instead of a law: ``"free"``, ``"step 0.5"``, ``"square 0.5 2"``, ``"sine 0.5 1.2"``,
         ``"sweep 0.5 0.5 10"`` [command unit, s, Hz].
     duration : float
         [s].
-    start : str or mapping, optional
-        Deviation of the last coordinate when the hand of a twin lets go, ``"5 deg"``; a number is [rad or m]. Under a
-        law 3 degrees, or 3 mm, when omitted, so that there is something to see.
     check : bool
         Compare a small pulse with the model first.
     watch : bool
-        Tell wrong encoders and a weak drive from hands and friction beside the loop.
+        Monitor the loop for faulty encoders and a weak drive.
     out : path
         Folder for the log and the page.
     pdf : bool
@@ -86,7 +82,7 @@ def run(
         Shown how it goes; answers with a sentence to end the run. On hardware it has 2 s for that: who looks no more
         cannot stop it either, and it ends.
     **on
-        Of the run: reference, mode, accept; see `RunOptions`.
+        Of the run: start, reference, mode, accept; see `RunOptions`.
 
     Returns
     -------
@@ -102,7 +98,7 @@ def run(
     from upright.running.run import RunRequest, run_rig
 
     folder, on = page_folder(out, pdf), known_options(RunOptions, on, "run")
-    leaning = _let_go(start, path_of(rig, "the rig that runs"), law=law is not None)
+    leaning = _let_go(on.get("start"), path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
         excite=excite or "", reference=on.get("reference") or "", seconds=duration, mode=on.get("mode") or "host",
@@ -151,7 +147,7 @@ def _let_go(start: Start | float | None, rig: Path, *, law: bool) -> float:
     """,
 )
 def rig_check(
-    *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
+    *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: PathLike | None = None
 ) -> Answer[Jitter]:
     """Measure how late this machine wakes a loop, and say whether a rate is safe on it.
 
@@ -203,7 +199,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
 @command(
     name="rig doctor",
     metavars={"rig": "RIG.toml"},
-    helps={"rig": "What the rig is, and how far it may go."},
+    helps={"rig": "Description and limits of the rig."},
     prepare=_for_hardware,
     wrong=lambda answer: not answer.chapter.sound,
     more="""
@@ -213,7 +209,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     """,
 )
 def rig_doctor(
-    rig: str | os.PathLike[str], *, clear: bool = False, pulse: bool = True,
+    rig: PathLike, *, clear: bool = False, pulse: bool = True,
     hand: Callable[[str], bool] | None = None,
 ) -> Answer[Checkup]:  # fmt: skip
     """Walk through a rig's first power-up: link, limits, encoders by hand, pulses, stop button, travel, watchdog.

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.files import keeps_its_inputs
 from upright.verbs.command import command
 from upright.verbs.control.moving import Played, played, played_run
 from upright.verbs.handover import rig_of
 from upright.verbs.options import TrialOptions
+
+if TYPE_CHECKING:
+    from upright.files import PathLike
+    from upright.verbs.forms import RigLike, StudyLike
 
 
 @command(
@@ -26,13 +29,13 @@ from upright.verbs.options import TrialOptions
 )
 @keeps_its_inputs
 def play(
-    fit: Any, *, poles: str | Iterable[complex] | None = None, seed: int = 0, log: Any = None,
-    out: str | os.PathLike[str] | None = None, **on: Unpack[TrialOptions],
+    fit: RigLike, *, poles: str | Iterable[complex] | None = None, seed: int = 0, log: StudyLike | None = None,
+    out: PathLike | None = None, **on: Unpack[TrialOptions],
 ) -> Played:  # fmt: skip
     """Write a page with a live twin: push it, drag its poles, see which rigs of the fit are stabilised.
 
-    The rig is simulated in the page, with dry friction, delay, encoder counts and limit; no request leaves it. Beside
-    it the rigs that the covariance of the fit allows run under the same law at every change.
+    The rig is simulated in the page, with dry friction, delay, encoder counts and limit; the page works offline. Rigs
+    drawn from the fit's covariance run beside it under the same law, again at every change.
 
     Parameters
     ----------
@@ -41,9 +44,9 @@ def play(
     poles : str or sequence of complex
         Closed-loop poles to begin with [1/s]; proposed as by `design` when omitted.
     seed : int
-        Of the rigs that are drawn.
+        Random seed of the rigs drawn from the fit's covariance.
     log : path, Record or pandas.DataFrame, optional
-        A run of the rig: the page plays it, measured and as the fit predicts it, with a slider of time.
+        Log of a run to play in the page, measured and predicted, with a slider for time.
     out : path, optional
         Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
     **on

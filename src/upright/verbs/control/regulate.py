@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
@@ -20,6 +19,8 @@ from upright.verbs.values import read_pole_list, read_start
 
 if TYPE_CHECKING:
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
+    from upright.files import PathLike
+    from upright.verbs.forms import RigLike
     from upright.verbs.values import Workforce
 
 _poles = read_pole_list  # the verbs have options of this name
@@ -29,12 +30,12 @@ _poles = read_pole_list  # the verbs have options of this name
     "Control",
     defaults={"out": "upright-regulate"},
     names={"which": "--set"},
-    metavars={"source": "[FIT]", "rig": "MAKE", "which": "N", "start": "LIST"},
+    metavars={"source": "[FIT]", "rig": "MODEL", "which": "N", "start": "LIST"},
     helps={
         "source": FIT + "a twin is identified without it.",
         "which": "Pole set of Table 1, 1 to 4, or all.",
         "poles": 'Poles [1/s] of your own: "-4.15+-1.63j, -16, -3".',
-        "start": 'Of the pendulum when let go: "12 deg", or "theta=12 deg, theta_dot=1.5 rad/s".',
+        "start": 'Start of the pendulum: "12 deg" from upright, or "theta=12 deg, theta_dot=1.5 rad/s".',
     },
     ranges={"draws": (1, None)},
     more="""
@@ -46,15 +47,15 @@ _poles = read_pole_list  # the verbs have options of this name
 @written_where_named
 @keeps_its_inputs
 def regulate(
-    source: Any = None, *, rig: str | None = None, seed: int | None = None, which: int | str | None = None,
-    poles: str | Iterable[complex] | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    source: RigLike | None = None, *, rig: str | None = None, seed: int | None = None, which: int | str | None = None,
+    poles: str | Iterable[complex] | None = None, out: PathLike | None = None, pdf: bool = False,
     workers: Workforce = 1, progress: Progress = silent, **on: Unpack[TrialOptions],
 ) -> Answer[Regulation]:  # fmt: skip
-    """Compare pole sets that hold a rig upright: the predicted probability of each, then the runs.
+    """Compare pole sets that stabilise a rig upright: the predicted probability of each, then the runs.
 
-    Gains are placed on the numbers identified while the rig hung. What will come is simulated with limit, counts, delay
-    and dry friction, on rigs as the fit's covariance allows; the laws then run on a twin, and both are put side by
-    side.
+    Gains are placed on the numbers identified while the rig hung. Each set is simulated with limit, encoder counts,
+    delay and dry friction, on rigs drawn from the fit's covariance. The laws then run on a twin; predicted and measured
+    stand side by side.
 
     Parameters
     ----------
@@ -62,10 +63,10 @@ def regulate(
         What `identify` answered, fit.json or its folder, or a plant with its numbers; a twin is identified when
         omitted.
     rig : str, optional
-        Twin to identify: furuta or linear; with a fit, the make whose vendor is chosen.
+        Twin to identify, furuta or linear; with a fit, the rig model whose vendor is chosen.
     seed : int, optional
-        Which twin of the make runs, or which rig that the fit's covariance allows where no vendor is named; with a fit
-        and no seed nothing is run.
+        Random seed of the twin that runs: of its rig model, or, where no vendor is named, of a rig drawn from the fit's
+        covariance. With a fit and no seed nothing runs.
     which : int or str, optional
         Pole set of Table 1, 1 to 4, or all; the command line's ``--set``.
     poles : str or sequence of complex, optional
@@ -75,7 +76,7 @@ def regulate(
     pdf : bool
         Write the page as PDF too.
     workers : int, str or executor
-        Who simulates those rigs: processes of this machine, the address of a Dask scheduler, or an executor of
+        Number of processes of this machine, the address of a Dask scheduler, or an executor of
         `concurrent.futures`; the numbers are the same.
     progress : callable, optional
         Called with the current step and the share completed.

@@ -17,9 +17,11 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import paths
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.identification.model.runs import Run
     from upright.report.fit.compare import ComparedRun, Comparison
     from upright.study.stored_fit import StoredFit
+    from upright.verbs.forms import FitLike, StudyLike
 
 LEAD = 0.4
 """Share of a run after which fits may look at it for its start state; from its half on they predict."""
@@ -70,27 +72,27 @@ def _is_fit(path: Path) -> bool:
 
     upright compare viscous-fit coulomb-fit OTHER.toml -o compared
 
-    Exit code: 0 a fit predicts what none has seen, better than an equation
-    without physics; 3 none does, or nothing tests them; 2 a file is wrong.
+    Exit code: 0 a fit predicts unseen runs better than the black-box baseline; 3 none does, or there is no unseen run;
+    2 a file is wrong.
     """,
 )
 @keeps_its_inputs
 def compare(
-    fits: Sequence[Any], log: Any = None, *, data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    fits: Sequence[FitLike] | FitLike, log: StudyLike | None = None, *, data: PathLike | None = None,
+    out: PathLike | None = None, pdf: bool = False,
 ) -> ComparisonAnswer:  # fmt: skip
-    """Compare fits with each other, with an equation without physics and with a run that none has seen.
+    """Compare fits with each other, with a black-box (ARX) baseline, and on a run that none was fitted to.
 
     Every fit predicts the second half of each run; a linear difference equation (ARX), fitted to its first half, is
-    the baseline that physics must beat. Parameters stand beside each other with their intervals, and a two-sided test
-    says which differ.
+    the baseline that physics must beat. Parameters are listed side by side with their intervals; a two-sided test marks
+    those that differ.
 
     Parameters
     ----------
     fits : sequence of answers of `identify` or paths
         What `identify` answered, fit.json files, or their folders.
     log : path, Study, Record or pandas.DataFrame, optional
-        Runs to predict. Without it the runs that studies of fits in memory hold out, if no fit has seen them.
+        Runs to predict; when omitted, the runs that the fits' studies hold out.
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     out : path, optional
@@ -217,7 +219,7 @@ def _logs(fit: StoredFit) -> set[str]:
 
 
 def _runs(
-    sources: Mapping[str, Any], fitted: Mapping[str, StoredFit], log: Any, data: str | os.PathLike[str] | None
+    sources: Mapping[str, Any], fitted: Mapping[str, StoredFit], log: Any, data: PathLike | None
 ) -> dict[str, ComparedRun]:  # fmt: skip
     """Every run as all predict it."""
     from upright.verbs.model.predict import runs_to_predict
