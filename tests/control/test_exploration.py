@@ -33,7 +33,10 @@ GAIN, DRY, LIMIT, TRAVEL, PERIOD = 5.25, 0.8, 5.0, 0.4, 4e-3
 RIG = up.Rig.known(CART, gain=GAIN, limit=LIMIT, period=PERIOD, counts=(200_000, 4096), travel=TRAVEL)
 BOUND = 0.15 * TRAVEL
 assert BOUND == 0.06
-NAMES = ["mode", "since", "q0", "h0", "v0", "w0", "marked", "q", "h", "v", "w", "v_slow", "w_slow", "side", "sign", "level", "gain", "up", "down", "way", "began"]
+NAMES = (
+    "mode", "since", "q0", "h0", "v0", "w0", "marked", "q", "h", "v", "w", "v_slow", "w_slow", "side", "sign", "level",
+    "gain", "up", "down", "way", "began",
+)  # fmt: skip
 ORDER = [WAITS, RISES, RESTS, FALLS, STOPS, KICKS, PUMPS, BRAKES, COASTS, CALMS, ENDS]
 WIRED = [(1, 1, 1), (-1, 1, 1), (1, -1, 1), (1, 1, -1)]
 J = CART.J_p + CART.m_p * CART.l_cg**2
