@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
-from upright.identification.checks.outliers import Candidate, refit_without_outliers
+from upright.identification.checks.outliers import ProvisionalFit, refit_without_outliers
 from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
 from upright.identification.inference.bands import calibrated
@@ -109,25 +109,25 @@ def identify(
     fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     conventions = cache(lambda: wrong_conventions(rig, fitted))
 
-    def candidate(retained: Sequence[Run], near: Fit | None) -> Candidate:
+    def located(retained: Sequence[Run], near: Fit | None) -> ProvisionalFit:
         looking = watch and retained is runs
-        return _candidate(rig, retained, method, progress, moments, conventions, watch=looking, near=near)
+        return _provisional(rig, retained, method, progress, moments, conventions, watch=looking, near=near)
 
-    first = candidate(runs, near)
+    first = located(runs, near)
     if not watch or first.fit.interrupted or first.fit.failed:
         return first.whole()
     try:
-        fit = refit_without_outliers(first, rig, runs, candidate)
+        fit = refit_without_outliers(first, rig, runs, located)
         explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
         return fit if explained or conventions() else with_proposal(fit, fitted)
     except KeyboardInterrupt:
         return first.interrupted()
 
 
-def _candidate(
+def _provisional(
     rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, moments: Moments,
     conventions: Callable[[], Sequence[str]], *, watch: bool, near: Fit | None,
-) -> Candidate:  # fmt: skip
+) -> ProvisionalFit:  # fmt: skip
     """Where the search ends; `moments` and `conventions` are those of all samples."""
     began = time.perf_counter()
     fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
@@ -164,7 +164,7 @@ def _candidate(
     except KeyboardInterrupt:
         optimum = replace(optimum, interrupted=True)
         fit = conclude(optimum, values=True)
-    return Candidate(fit=fit, whole=whole, interrupted=lambda: conclude(replace(optimum, interrupted=True)))
+    return ProvisionalFit(fit=fit, whole=whole, interrupted=lambda: conclude(replace(optimum, interrupted=True)))
 
 
 def find_optimum(

@@ -17,8 +17,8 @@ from upright.identification.checks.outliers import (
     SPIKES,
     TOUCHED,
     UNEXPLAINED,
-    Candidate,
     Outlier,
+    ProvisionalFit,
     Stretches,
     _spiky,
     _strange,
@@ -203,7 +203,7 @@ def test_a_fast_motion_is_no_spike():
 
 def ended(fit):
     """A search of which everything is known already."""
-    return Candidate(fit=fit, whole=lambda: fit, interrupted=lambda: fit)
+    return ProvisionalFit(fit=fit, whole=lambda: fit, interrupted=lambda: fit)
 
 
 @pytest.mark.parametrize("interrupted", [False, True])

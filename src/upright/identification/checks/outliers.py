@@ -300,7 +300,7 @@ STAYS = "Without that stretch the other runs were explained worse, so the fit ke
 
 
 @dataclass(frozen=True, kw_only=True)
-class Candidate:
+class ProvisionalFit:
     """Where a search ended: values and scores of its `fit`, enough to see outliers by; `whole` adds all the rest.
 
     Intervals, predictions and the verdict take as long as the search, and only one of several candidates needs them.
@@ -313,7 +313,7 @@ class Candidate:
 
 
 def refit_without_outliers(
-    first: Candidate, rig: GreyBox, runs: Sequence[Run], again: Callable[[Sequence[Run], Fit], Candidate]
+    first: ProvisionalFit, rig: GreyBox, runs: Sequence[Run], again: Callable[[Sequence[Run], Fit], ProvisionalFit]
 ) -> Fit:
     """The fit, or `again` without what the first one found strange; at most twice, as outliers hide each other.
 
