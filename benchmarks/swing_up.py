@@ -132,7 +132,7 @@ def _sensors(make: str, count: int) -> list[Line]:
     return [
         _line(
             make, "encoders, hanging", hanging / (2 * count),
-            f"{wrong} of {count} lies found, {named} named, scale off by {np.median(worst):.1g}, at most"
+            f"{wrong} of {count} faulty encoders detected, {named} named, scale off by {np.median(worst):.1g}, at most"
             f" {max(worst):.1g}; {false} false alarms in {count} sound rigs",
         ),
         _line(

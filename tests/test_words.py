@@ -15,11 +15,12 @@ ROOT = Path(__file__).parent.parent
 FILES = sorted((ROOT / "src/upright").rglob("*.py"))
 
 REPLACED = frozenset(
-    ["told", "wish", "wishes", "asked", "found", "said", "seen", "foreseen", "abreast", "shaken", "worn", "quantum"]
+    {"told", "wish", "wishes", "asked", "found", "said", "seen", "foreseen", "abreast", "shaken", "worn", "quantum"}
+    | {"lie", "lies", "lying"}
 )
 """Words that name nothing: the name is the request, the estimate, the message, the prediction, ... that it is."""
 
-STANDING = {"quantum", "command_quantum", "WORN", "FileNotFoundError"}
+STANDING = {"quantum", "command_quantum", "WORN", "lies", "LIE", "FileNotFoundError"}
 """Former public names, which warn for one version, and Python's own; this set only shrinks."""
 
 ANYWHERE = re.compile(r"\b(told|wish(es|ed)?|abreast|shaken|quantum|foresees?)\b", re.IGNORECASE)

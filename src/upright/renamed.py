@@ -21,6 +21,7 @@ LET_GO: Mapping[str, Now] = {
 
 WORN: Mapping[str, Now] = {"worn": ("nonideal", lambda value: value)}
 CLUSTER: Mapping[str, Now] = {"cluster": ("workers", lambda value: value)}
+LIE: Mapping[str, Now] = {"lie": ("fault", lambda value: value)}
 
 
 def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:

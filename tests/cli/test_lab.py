@@ -175,6 +175,6 @@ def test_what_the_report_proposes_works(spoken, tmp_path, monkeypatch):
     assert len(proposed) >= 2 * len(EXPERIMENTS)
     for arguments in proposed:
         again = CliRunner().invoke(app, arguments)
-        # 3: the answer is no, as it should be where an encoder lies, and may be of a swing unlike the one fitted
-        wanted = (3,) if "--lie" in arguments else (0, 3) if arguments[0] == "predict" else (0,)
+        # 3: the answer is no, as it should be where an encoder is faulty, and may be of a swing unlike the one fitted
+        wanted = (3,) if "--fault" in arguments else (0, 3) if arguments[0] == "predict" else (0,)
         assert again.exit_code in wanted, (arguments, again.output)

@@ -30,7 +30,7 @@ def test_the_pendulum_gets_up_and_the_page_is_written(tmp_path):
 
 @pytest.mark.slow
 def test_a_lying_encoder_ends_it_with_a_sentence(tmp_path):
-    outcome = upright("swing-up", "--rig", "linear", "--lie", "theta=-1", "-o", tmp_path)
+    outcome = upright("swing-up", "--rig", "linear", "--fault", "theta=-1", "-o", tmp_path)
     assert outcome.exit_code == 3
     words = "encoder of theta counts the wrong way round: swap its two channels"
     assert words in outcome.stdout
@@ -44,8 +44,8 @@ def test_what_cannot_be_done_is_said_in_a_sentence(tmp_path):
     for arguments, words in (
         (("--rig", "torsional"), "needs a pendulum theta on a driven body"),
         (("--rig", "balloon"), "there is no make 'balloon'"),
-        (("--lie", "phi=2"), "--lie names a coordinate"),
-        (("--lie", "theta=zero"), "needs a factor"),
+        (("--fault", "phi=2"), "--fault names a coordinate"),
+        (("--fault", "theta=zero"), "needs a factor"),
         (("--travel", "-1"), "--travel must be above 0"),
         ((tmp_path / "none.json",), "does not exist"),
     ):

@@ -58,7 +58,7 @@ def test_bodies_in_counts_or_lengths_are_alike_and_an_angle_is_not():
 
 
 def test_what_is_measured_is_what_is_placed_else_the_outputs_else_what_looks_like_a_place():
-    said = {"index": {"lies": ("the index of the row",)}, "off": {"constant": True}, "push": {"drive": True}}
+    said = {"index": {"remarks": ("the index of the row",)}, "off": {"constant": True}, "push": {"drive": True}}
     made = case(a=SINE, b=SINE, index=np.arange(200.0), off=0 * T, push=SINE, columns=said)
     assert [c.name for c in made.measured] == ["a", "b"]
     outputs = replace(made, record=made.record.replace(outputs=("b",)))
@@ -109,7 +109,7 @@ def test_a_drive_is_driven_where_an_effort_ever_leaves_zero():
 
 
 def test_a_column_tells_time_or_speed_by_what_is_known_of_it():
-    said = {"a": {"lies": ("the time again",)}, "b": {"unit": "", "guess": "deg"}}
+    said = {"a": {"remarks": ("the time again",)}, "b": {"unit": "", "guess": "deg"}}
     made = case(a=SINE, b=SINE, c=SINE, x_dot=SINE, units={"c": "m/s"}, columns=said)
     a, b, c, rate = (made.inspection.column(n) for n in ("a", "b", "c", "x_dot"))
     assert [tells_time(x) for x in (a, b)] == [True, False]

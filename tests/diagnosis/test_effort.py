@@ -169,7 +169,7 @@ def test_the_first_of_several_bodies_is_named():
     ],
 )  # fmt: skip
 def test_a_column_that_is_not_what_its_name_says_is_told_once(lie, kind, severity, sentence, key):
-    made = case(x=SWING, v=NOISE, measured=("x",), columns={"v": {"lies": (lie, lie), "drive": False}})
+    made = case(x=SWING, v=NOISE, measured=("x",), columns={"v": {"remarks": (lie, lie), "drive": False}})
     (finding,) = [f for f in examine_effort(made) if f.columns == ("v",)]
     assert (finding.kind, finding.severity, finding.sentence, finding.key) == (kind, severity, sentence, key)
     assert finding.evidence == pytest.approx({"lowest [1]": NOISE.min(), "highest [1]": NOISE.max()})
@@ -179,7 +179,7 @@ def settings(text, size=2.0):
     u = 819.2 * size * np.where((T > 1) & (T < 4), 1.0, 0.0)
     return list(examine_settings(case(
         x=SWING, dac=u, measured=("x",), notes=(f"runParameters: {text}",),
-        columns={"dac": {"lies": ("the command in DAC counts",)}},
+        columns={"dac": {"remarks": ("the command in DAC counts",)}},
     )))  # fmt: skip
 
 

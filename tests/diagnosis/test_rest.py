@@ -145,8 +145,8 @@ def test_rests_of_a_speed_beside_a_reference_or_too_short_are_none() -> None:
     assert [f.kind for f in examine_rest(made) if f.kind == "drift"]
     speed = case(x=rests(0.1 * span), u=u, drive="u", units={"x": "m/s"})
     assert not [f for f in examine_rest(speed) if f.kind == "drift"]
-    lies = case(x=rests(0.1 * span), u=u, drive="u", columns={"u": {"lies": ("the reference",)}})
-    assert not [f for f in examine_rest(lies) if f.kind == "drift"]
+    reference = case(x=rests(0.1 * span), u=u, drive="u", columns={"u": {"remarks": ("the reference",)}})
+    assert not [f for f in examine_rest(reference) if f.kind == "drift"]
     spans = made.inspection.rests
 
     def with_rests(*found: tuple[float, float]) -> list[Finding]:

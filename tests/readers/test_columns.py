@@ -17,7 +17,7 @@ from upright.readers.inspection import (
     effort_unit,
     first_outlier,
     follows_encoder,
-    lies,
+    remarks,
     sample_index,
     time_base,
     time_copy,
@@ -418,7 +418,7 @@ def test_a_difference_is_looked_for_in_twenty_samples_or_more():
 def test_a_column_is_compared_with_all_the_others_and_never_with_itself():
     v = np.r_[0, QUOTIENT]
     record = Record(t=T, signals={"p": COUNTS, "v": v, "w": -v, "k": 0 * T + 3})
-    assert lies(record, "p") == ()
-    assert lies(record, "k") == ()
-    assert lies(record, "v") == ("'w' times -1", "the backward difference quotient of 'p', not a sensor of its own")
-    assert lies(record, "w") == ("'v' times -1",)
+    assert remarks(record, "p") == ()
+    assert remarks(record, "k") == ()
+    assert remarks(record, "v") == ("'w' times -1", "the backward difference quotient of 'p', not a sensor of its own")
+    assert remarks(record, "w") == ("'v' times -1",)

@@ -1,4 +1,4 @@
-"""Is a log seen through: its steps, its lies, its gaps and when it rests?"""
+"""Is a log seen through: its steps, its remarks, its gaps and when it rests?"""
 
 from __future__ import annotations
 
@@ -74,10 +74,10 @@ def test_a_difference_quotient_is_no_sensor_but_a_tachometer_is() -> None:
     tachometer = np.gradient(theta, t) + np.random.default_rng(0).normal(0, 0.01, t.size)
     record = Record(t=t, signals={"p": theta_counts, "v": quotient, "vf": filtered, "tacho": tachometer})
     seen = inspect(record)
-    assert "backward difference quotient of 'p'" in seen.column("v").lies[0]
-    assert "first-order filter (weight 0.2)" in " ".join(seen.column("vf").lies)
-    assert seen.column("tacho").lies == ()
-    assert seen.column("p").lies == ()
+    assert "backward difference quotient of 'p'" in seen.column("v").remarks[0]
+    assert "first-order filter (weight 0.2)" in " ".join(seen.column("vf").remarks)
+    assert seen.column("tacho").remarks == ()
+    assert seen.column("p").remarks == ()
 
 
 @pytest.mark.parametrize("weight", [0.05, 0.4, 0.7])
@@ -89,13 +89,13 @@ def test_the_weight_of_a_filtered_difference_quotient_is_that_of_its_program(wei
     filtered = np.zeros_like(quotient)
     for k in range(1, t.size):
         filtered[k] = filtered[k - 1] + weight * (quotient[k] - filtered[k - 1])
-    lies = inspect(Record(t=t, signals={"p": counts, "v": filtered})).column("v").lies
-    assert f"first-order filter (weight {weight:.2g})" in " ".join(lies)
+    remarks = inspect(Record(t=t, signals={"p": counts, "v": filtered})).column("v").remarks
+    assert f"first-order filter (weight {weight:.2g})" in " ".join(remarks)
 
 
 def test_an_exact_rate_beside_an_exact_position_is_not_accused() -> None:
     t, theta = swing()
-    assert inspect(Record(t=t, signals={"p": theta, "v": np.gradient(theta, t)})).column("v").lies == ()
+    assert inspect(Record(t=t, signals={"p": theta, "v": np.gradient(theta, t)})).column("v").remarks == ()
 
 
 def test_copies_of_time_index_and_other_columns_are_named() -> None:
@@ -103,9 +103,9 @@ def test_copies_of_time_index_and_other_columns_are_named() -> None:
     seen = inspect(
         Record(t=t, signals={"received": t + 4e-4, "Sample": np.arange(500), "x": theta, "deg": theta * 180 / math.pi})
     )
-    assert "a copy of the time, 0.4 ms later" in seen.column("received").lies[0]
-    assert "sample index" in seen.column("Sample").lies[0]
-    assert "times 57.2958" in seen.column("deg").lies[0]
+    assert "a copy of the time, 0.4 ms later" in seen.column("received").remarks[0]
+    assert "sample index" in seen.column("Sample").remarks[0]
+    assert "times 57.2958" in seen.column("deg").remarks[0]
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_an_effort_in_dac_counts_is_told_from_a_reference(level: int, sentence: 
     column = inspect(Record(t=t, signals={"enc": np.round(900 * theta), "Control Effort": effort})).column(
         "Control Effort"
     )
-    assert sentence in column.lies[0]
+    assert sentence in column.remarks[0]
     assert column.drive
     assert [value for _, value in column.switches] == [level, 0]
 
@@ -152,20 +152,20 @@ def test_a_commanded_position_that_is_the_measured_one_is_no_reference() -> None
     encoder = 3.0 * np.abs(np.arange(600) % 200 - 100)
     late = np.concatenate([encoder[:1], encoder[:-1]])
     seen = inspect(Record(t=t, signals={"Commanded Pos": late, "Encoder 1 Pos": encoder}))
-    assert seen.column("Commanded Pos").lies == (
+    assert seen.column("Commanded Pos").remarks == (
         "follows 'Encoder 1 Pos' (steps differ by 0 at the median); no reference, open loop",
     )
     reference = np.where(np.arange(600) % 200 < 100, 300.0, 0.0)
     seen = inspect(Record(t=t, signals={"Commanded Pos": reference, "Encoder 1 Pos": encoder}))
-    assert not any("follows" in lie for lie in seen.column("Commanded Pos").lies)
+    assert not any("follows" in remark for remark in seen.column("Commanded Pos").remarks)
 
 
 def test_a_commanded_position_a_sixth_of_a_turn_ahead_of_the_encoder_does_not_follow_it() -> None:
     """Over whole turns two waves correlate by the cosine of what they are apart: 1/2 here, however large they are."""
     angle = 2 * math.pi * np.arange(600) / 200
     encoder, command = 300 * np.cos(angle), 300 * np.cos(angle + math.pi / 3)
-    lies = inspect(Record(t=1e-3 * np.arange(600), signals={"Commanded Pos": command, "Encoder 1 Pos": encoder}))
-    assert not any("follows" in lie for lie in lies.column("Commanded Pos").lies)
+    seen = inspect(Record(t=1e-3 * np.arange(600), signals={"Commanded Pos": command, "Encoder 1 Pos": encoder}))
+    assert not any("follows" in remark for remark in seen.column("Commanded Pos").remarks)
 
 
 def test_first_samples_that_are_far_outside_the_rest_are_named() -> None:
@@ -173,8 +173,8 @@ def test_first_samples_that_are_far_outside_the_rest_are_named() -> None:
     first, later = theta.copy(), theta.copy()
     first[1] = later[5] = -80.0
     seen = inspect(Record(t=t, signals={"first": first, "later": later}))
-    assert any("the first samples are outliers (80 against 0.89" in lie for lie in seen.column("first").lies)
-    assert not any("first samples" in lie for lie in seen.column("later").lies)
+    assert any("the first samples are outliers (80 against 0.89" in remark for remark in seen.column("first").remarks)
+    assert not any("first samples" in remark for remark in seen.column("later").remarks)
 
 
 def test_an_idle_input_is_named() -> None:
@@ -221,3 +221,9 @@ def test_volts_that_change_with_every_sample_measure_and_those_in_steps_drive(na
     volts = np.repeat([0.0, 1.5, -1.2, 0.7, -2.1, 0.0, 1.9, 0.3], t.size // 8) if drives else noisy
     seen = inspect(Record(t=t, signals={name: volts, "theta": theta}, units={name: "V", "theta": "rad"}))
     assert seen.column(name).drive == drives
+
+
+def test_the_former_name_of_a_columns_remarks_reads_the_same_and_warns():
+    column = inspect(Record(t=np.arange(9.0), signals={"k": np.arange(9.0)})).column("k")
+    with pytest.warns(DeprecationWarning, match="remarks"):
+        assert column.lies == column.remarks != ()

@@ -81,12 +81,12 @@ def test_steps_of_the_other_sensors(name: str, column: str, step: float, relativ
 
 def test_an_ecp_commanded_position_follows_the_encoder_in_open_loop_only() -> None:
     open_loop = inspect(real(EXPORT + "Open_Loop/test_3_1.csv"))
-    assert "follows 'Encoder 1 Pos'" in open_loop.column("Commanded Pos").lies[0]
+    assert "follows 'Encoder 1 Pos'" in open_loop.column("Commanded Pos").remarks[0]
     effort = open_loop.column("Control Effort")
     assert effort.unit == "V"
     assert [value for _, value in effort.switches] == [0.5, 0]
     assert effort.switches[1][0] == pytest.approx(3, abs=0.02)
-    assert inspect(real(EXPORT + "Closed_Loop/closed_loop_pid.csv")).column("Commanded Pos").lies == ()
+    assert inspect(real(EXPORT + "Closed_Loop/closed_loop_pid.csv")).column("Commanded Pos").remarks == ()
     assert inspect(real(EXPORT + "Open_Loop/test_1_1.csv")).column("Control Effort").idle
 
 
@@ -107,7 +107,7 @@ def test_an_ecp_commanded_position_follows_the_encoder_in_open_loop_only() -> No
     ],
 )
 def test_columns_that_lie_are_recognised(name: str, column: str, sentence: str) -> None:
-    assert sentence in " ".join(inspect(real(name)).column(column).lies)
+    assert sentence in " ".join(inspect(real(name)).column(column).remarks)
 
 
 def test_the_front_end_writes_the_same_run_as_text_and_as_matlab() -> None:

@@ -16,7 +16,7 @@ T = np.linspace(0.0, 2.0, 41)
 TIME = TimeBase(samples=41, period=0.05, duration=2.0, late=0.0, rounding=0.0, jitter=0.0, gaps=(), rebuilt=False)
 PLAIN = Column(
     name="theta", unit="rad", guess="", low=-1.25, high=2.5, resolution=Resolution(), constant=False, low_share=0.0,
-    high_share=0.0, turns=0, drive=False, idle=False, switches=(), stepwise=False, lies=(),
+    high_share=0.0, turns=0, drive=False, idle=False, switches=(), stepwise=False, remarks=(),
 )  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def test_a_column_stands_with_its_range_unit_and_step():
         ({"constant": True, "low": 2.5, "drive": True, "turns": 3}, "constant 2.5"),
         ({"constant": True, "idle": True}, "idle, always 0"),
         ({"drive": True}, "drives?"),
-        ({"drive": True, "lies": ("holds the reference",)}, "holds the reference"),
+        ({"drive": True, "remarks": ("holds the reference",)}, "holds the reference"),
         ({"drive": True, "switches": ((0.5, 2.0), (1.5, 0.0))}, "drives?; leaves 0 at 0.5 s, back at 0 at 1.5 s"),
         ({"switches": ((0.5, 2.0), (1.5, 0.0)), "stepwise": True}, "switches to 2 at 0.5 s, to 0 at 1.5 s"),
         ({"switches": ((0.5, 2.0),) * 6, "stepwise": True}, "switches " + ", ".join(["to 2 at 0.5 s"] * 6)),
@@ -119,9 +119,9 @@ def test_notes_stand_between_the_columns_and_their_picture():
 def test_columns_are_drawn_over_time_with_rests_and_gaps_drives_last():
     columns = (
         replace(PLAIN, name="u", unit="", guess="V", drive=True, stepwise=True), PLAIN,
-        replace(PLAIN, name="stamp", lies=("This is the time once more.",)),
-        replace(PLAIN, name="k", lies=("A sample index.",)), replace(PLAIN, name="still", constant=True),
-        replace(PLAIN, name="a" * 31, unit="", lies=("It follows theta.",)),
+        replace(PLAIN, name="stamp", remarks=("This is the time once more.",)),
+        replace(PLAIN, name="k", remarks=("A sample index.",)), replace(PLAIN, name="still", constant=True),
+        replace(PLAIN, name="a" * 31, unit="", remarks=("It follows theta.",)),
     )  # fmt: skip
     rows = record("u", "theta", "stamp", "k", "still", "a" * 31)
     gaps = tuple(Gap(start=0.01 * i, length=0.01, missing=1) for i in range(21))
@@ -158,5 +158,5 @@ def test_where_nothing_moves_the_constant_stands_in_the_middle_of_its_axis(value
 
 
 def test_a_log_of_nothing_but_times_is_drawn_all_the_same():
-    stamp = replace(PLAIN, name="stamp", lies=("This is the time once more.",))
+    stamp = replace(PLAIN, name="stamp", remarks=("This is the time once more.",))
     assert [a.get_ylabel() for a in draw_columns(record("stamp"), seen(stamp)).axes] == ["stamp\n[rad]"]

@@ -29,8 +29,19 @@ def test_a_command_beyond_friction_is_believed_to_have_moved_it_after_forty_coun
     """From rest under a constant excess a the way is a t^2/2."""
     still, command = StillDrive(RIG, "inverted"), times * HELD_BY * sticking(RIG)
     excess = abs(MODEL.B[1, 0]) * (command - HELD_BY * sticking(RIG))
-    k = next(k for k in range(5000) if still.sees(0.0, [0.0, 0.0], command))
+    shown = 2.5 / RIG.per_unit[1]  # its pendulum goes up and down, as on all that moves
+    k = next(k for k in range(5000) if still.sees(0.0, [0.0, (k % 2 - 0.5) * shown], command))
     assert k * T == pytest.approx(math.sqrt(2 * UNSEEN / RIG.per_unit[0] / excess), abs=2 * T)
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.028])
+def test_an_arm_that_a_hand_holds_against_its_command_is_not_taken_for_one_with_a_dead_encoder(lean):
+    """A hand pushed a sound Furuta's arm with 1.9 rad/s^2 and held it against 3.0 of command and lean; its pendulum
+    stood as still as the arm did, to a count. On an arm that moves it does not."""
+    still, command = StillDrive(RIG, "inverted"), 3 * HELD_BY * sticking(RIG)
+    count = 1 / RIG.per_unit[1]
+    assert not any(still.sees(0.4, [0.4, lean + count * (k % 2)], command) for k in range(2000))
+    assert still.sees(0.4, [0.4, lean + math.radians(0.5)], command)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5])

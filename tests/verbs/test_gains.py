@@ -99,6 +99,11 @@ def test_a_file_is_no_folder_for_a_laboratory(tmp_path):
         up.lab(out=tmp_path / "out")
 
 
+def test_the_former_name_of_a_faulty_encoder_means_the_same_and_warns():
+    with pytest.warns(DeprecationWarning, match="fault="), pytest.raises(up.BadInput, match=r"got '-100\.1'"):
+        up.swing_up(lie={"theta": -100.1})
+
+
 def test_the_former_name_of_nonideal_rigs_means_the_same_and_warns():
     with (
         pytest.warns(DeprecationWarning, match="nonideal="),

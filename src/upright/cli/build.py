@@ -27,7 +27,7 @@ METAVARS = {
 }  # fmt: skip
 HELPS = {
     "pdf": "Write the page as PDF too (pdf extra).",
-    "workers": "Who shares the work: N processes of this machine, or a Dask scheduler, tcp://host:8786.",
+    "workers": "Share the work among N processes of this machine, or a Dask scheduler, tcp://host:8786.",
 }
 RANGES = {"seed": (0, None)}
 

@@ -1,4 +1,4 @@
-"""Scales of encoders that may lie, from the hanging rig before a loop is closed; `watch` looks on beside a running one.
+"""Scales of encoders, from the hanging rig before a loop is closed; `watch` monitors a running one.
 
 A command that swings the model to about 100 degrees is put out blindly, then the rig coasts. What the encoders show is
 compared with the motion of the model, whose numbers may move as far as they are known: s of ``reading = s motion`` is

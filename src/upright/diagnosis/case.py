@@ -160,7 +160,7 @@ class Case:
 
 def tells_time(c: Column) -> bool:
     """Whether a column only counts rows or repeats the time."""
-    return any("the time" in s or "index" in s for s in c.lies)
+    return any("the time" in s or "index" in s for s in c.remarks)
 
 
 def tells_speed(c: Column) -> bool:
@@ -260,7 +260,7 @@ def _recognised(record: Record, inspection: Inspection, plant: type[Plant] | Non
         recognised = None
     column = recognised.drive if recognised else drive_column(record, inspection)
     u: Array = record[column.name] if column is not None else np.zeros(record.t.size)
-    if column is not None and any(lie.startswith("the first samples are outliers") for lie in column.lies):
+    if column is not None and any(remark.startswith("the first samples are outliers") for remark in column.remarks):
         u = np.concatenate([np.full(3, u[3]), u[3:]])
     places: dict[str, Place] = {}
     chain = plant is not None and not any(c.name in ("theta", "psi", "x") for c in plant.coordinates)

@@ -20,22 +20,22 @@ from upright.signals.trips import TripRegression
 from upright.study.draft.recognise import drive_column
 
 STILL = 0.1
-"""Seconds at the beginning in which a rig must lie still before its first motion can be detected."""
+"""Seconds at the beginning in which a rig must rest before its first motion can be detected."""
 
 
 def examine_effort(case: Case) -> list[Finding]:
     """Findings about the columns that drive."""
-    return [*_lies(case), *_copies(case), *_constant(case), *_limited(case), *_early(case)]
+    return [*_mislabelled(case), *_copies(case), *_constant(case), *_limited(case), *_early(case)]
 
 
-def _lies(case: Case) -> list[Finding]:
+def _mislabelled(case: Case) -> list[Finding]:
     """Columns that are not what their name says, as the reader's inspection found."""
     findings: list[Finding] = []
     chosen = drive_column(case.record, case.inspection)
     for c in case.inspection.columns:
-        for lie in c.lies:
+        for remark in c.remarks:
             kind, severity, advice, key = "", "warning", "", ""
-            if "not the effort" in lie:
+            if "not the effort" in remark:
                 kind = "effort"
                 instead = chosen.name if chosen is not None and chosen.name != c.name else ""
                 advice = (
@@ -43,13 +43,13 @@ def _lies(case: Case) -> list[Finding]:
                     else "The effort is not in this log; simulate the loop that made it from this reference."
                 )  # fmt: skip
                 key = f'[drive]\ncolumn = "{instead}"' if instead else f'loop = {{ reference = "`{c.name}`" }}'
-            elif lie.startswith("the command in DAC counts"):
+            elif remark.startswith("the command in DAC counts"):
                 kind, severity = "effort", "warning" if "effort" in c.name.casefold() else "note"
                 advice = "Divide by 819 to get volts."
                 key = f'[drive]\ncolumn = "{c.name}"\nunit = "V"\nscale = {1 / 819:.6g}'
-            elif lie.startswith("follows"):
+            elif remark.startswith("follows"):
                 kind, advice = "effort", "Take the control effort as the input, not this column."
-            elif lie.startswith("the first samples are outliers"):
+            elif remark.startswith("the first samples are outliers"):
                 kind, advice = "spike", "Leave the first samples out of the window."
                 key = f'window = [{case.record.t[min(3, len(case.record) - 1)]:.6g}, "end"]'
             if not kind or any(f.columns == (c.name,) and f.kind == kind for f in findings):
@@ -60,8 +60,8 @@ def _lies(case: Case) -> list[Finding]:
                     kind=kind,
                     columns=(c.name,),
                     severity="note" if severity == "note" else "warning",
-                    sentence=f"'{c.name}' is {lie}." if not lie.startswith(("follows", "the first"))
-                    else f"'{c.name}': {lie}.",
+                    sentence=f"'{c.name}' is {remark}." if not remark.startswith(("follows", "the first"))
+                    else f"'{c.name}': {remark}.",
                     evidence={"lowest [1]": c.low, "highest [1]": c.high},
                     advice=advice,
                     key=key,
@@ -177,7 +177,7 @@ def examine_settings(case: Case) -> Iterator[Finding]:
     fields = {m[1]: float(m[2]) for m in re.finditer(r"(\w+) = (-?\d+(?:\.\d+)?(?:e-?\d+)?)", note)}
     if not {"Amplitude", "Reps"} <= fields.keys():
         return
-    dac = [c for c in case.inspection.columns if any(lie.startswith("the command in DAC") for lie in c.lies)]
+    dac = [c for c in case.inspection.columns if any(remark.startswith("the command in DAC") for remark in c.remarks)]
     stored, repetitions = fields["Amplitude"], fields["Reps"]
     if not dac:
         return

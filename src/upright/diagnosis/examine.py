@@ -135,5 +135,8 @@ def _forces(case: Case, findings: list[Finding]) -> tuple[list[Finding], dict[st
 def _in_dac(case: Case) -> bool:
     """Whether the effort is one in converter counts, which acts all the same."""
     return any(
-        lie.startswith("the command in DAC") for c in case.inspection.columns if c.name == case.drive for lie in c.lies
+        remark.startswith("the command in DAC")
+        for c in case.inspection.columns
+        if c.name == case.drive
+        for remark in c.remarks
     )

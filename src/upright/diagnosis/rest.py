@@ -54,7 +54,7 @@ def _drift(case: Case) -> Iterator[Finding]:
         levels = [float(np.median(x[(t >= a) & (t <= b)])) for a, b in quiet]
         if not case.driven:
             levels = levels[1:]  # before a release it is a hand that holds
-        if len(levels) < 2 or any("reference" in lie for c in case.inspection.columns for lie in c.lies):
+        if len(levels) < 2 or any("reference" in remark for c in case.inspection.columns for remark in c.remarks):
             continue
         off, span = max(levels) - min(levels), float(np.ptp(x))
         if off > max(0.03 * span, 5 * c.resolution.step):

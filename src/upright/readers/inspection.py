@@ -17,6 +17,7 @@ from upright import units
 from upright.errors import BadInput, nearest
 from upright.readers.resolution import Resolution, counts_per_rev, resolution_of, rounding
 from upright.records import Array, Record
+from upright.renamed import former
 from upright.signals.stretches import stretches
 
 _SHOWN = 12  # switches, gaps and rests beyond these tell nothing new
@@ -72,7 +73,7 @@ class Column:
     `unit` is stated by the log, `guess` ours when it is not; `low_share` and `high_share`: share of the samples
     pinned at the lowest and highest value (0 unless they stay there); `turns`: whole revolutions in the offset;
     `switches`: (time [s], new value) of a drive, at every step when it is `stepwise`, else where it leaves 0 and
-    returns; `idle`: a drive that never leaves 0.
+    returns; `idle`: a drive that never leaves 0; `remarks`: what it is besides a measurement (derived, mislabelled).
     """
 
     name: str
@@ -89,7 +90,8 @@ class Column:
     idle: bool
     switches: tuple[tuple[float, float], ...]
     stepwise: bool
-    lies: tuple[str, ...]
+    remarks: tuple[str, ...]
+    lies = former("remarks")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +119,7 @@ def inspect_record(record: Record) -> Inspection:
     moving = [
         record[c.name]
         for c in columns
-        if not (c.drive or c.constant or any("time" in s or "index" in s for s in c.lies))
+        if not (c.drive or c.constant or any("time" in s or "index" in s for s in c.remarks))
     ]
     return Inspection(
         file=record.provenance.file,
@@ -181,7 +183,7 @@ def _column(record: Record, name: str) -> Column:
         idle=drive and constant and low == 0,
         switches=_switches(record.t, x) if drive and not constant else (),
         stepwise=0 < int(np.count_nonzero(np.diff(x))) <= _SHOWN,
-        lies=lies(record, name),
+        remarks=remarks(record, name),
     )
 
 
@@ -273,7 +275,7 @@ _SAME = 0.75  # share of the changes explained; a sensor of its own, beside a po
 _ROUGH = 0.5  # neighbouring changes of a quotient must differ that much: steps of an encoder, not a smooth curve
 
 
-def lies(record: Record, name: str) -> tuple[str, ...]:
+def remarks(record: Record, name: str) -> tuple[str, ...]:
     """Sentences about one column of a record."""
     x = record.signals[name]
     if np.ptp(x) == 0:

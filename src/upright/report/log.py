@@ -72,7 +72,7 @@ def _remarks(column: Column) -> list[str]:
     """Short remarks on one column."""
     if column.constant:
         return ["idle, always 0" if column.idle else f"constant {column.low:g}"]
-    remarks = list(column.lies)
+    remarks = list(column.remarks)
     if column.drive and not remarks:
         remarks.append("drives?")
     if column.switches and not column.stepwise:
@@ -97,7 +97,7 @@ def draw_columns(record: Record, inspection: Inspection) -> Figure:
     Left out are columns that do not move, time and sample index; drives come last. Where nothing moves, the constant
     columns are drawn, so that no axis is empty.
     """
-    signals = [c for c in inspection.columns if not any("the time" in s or "index" in s for s in c.lies)] or [
+    signals = [c for c in inspection.columns if not any("the time" in s or "index" in s for s in c.remarks)] or [
         *inspection.columns
     ]
     moving = [c for c in signals if not c.constant]
@@ -122,8 +122,8 @@ def draw_columns(record: Record, inspection: Inspection) -> Figure:
         name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
         name = f"{name}\n[{unit}]" if unit else name  # shown as the log spells it
         axes.set_ylabel(name, rotation=0, ha="right", va="center", parse_math=False)
-        if column.lies:
-            axes.set_title(column.lies[0], fontsize=8.5, color=GREY, parse_math=False)
+        if column.remarks:
+            axes.set_title(column.remarks[0], fontsize=8.5, color=GREY, parse_math=False)
     hide_inner_times(panels)
     drawing.align_ylabels(panels)
     state = "grey: at rest" if moving else "nothing moves"

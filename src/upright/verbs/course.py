@@ -71,7 +71,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     names={"experiment": "--experiment -e", "rig": "--rig", "nonideal": "--nonideal --worn"},
     metavars={"experiment": "1|1a|1b|2|2b|3|4", "rig": "KIND|RIG.toml", "accept": "REASON"},
     helps={
-        "experiment": "Only this one, and what it stands on.",
+        "experiment": "Only this one, and those it depends on.",
         "rig": "linear, furuta, rectilinear or torsional, else the paper's; or RIG.toml.",
         "nonideal": "Rigs with unmodelled effects: stiction, ripple and play.",
     },
@@ -82,7 +82,7 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
     from that fit, 2b swings it up and catches it, 3 tracks through a flexible shaft, 4 lets the pendulum swing freely.
 
-    With a RIG.toml they are made on the rig itself; you are prompted for what no drive can do.
+    With a RIG.toml they run on the rig itself; you are prompted for what the drive cannot do.
 
     upright lab
     upright lab --rig linear --seed 3
@@ -102,34 +102,33 @@ def lab(
 ) -> Answer[Laboratory]:  # fmt: skip
     """Run the paper's experiments, on simulated rigs or on hardware, and write one report.
 
-    Or on hardware: identify, flip, design, hold, swing, report. Every log, study and fit is written to the folder
-    for the other verbs, and one report.html tells it all (report.pdf with the pdf extra). Ctrl-C keeps and reports what
-    is there; the same call goes on from there.
+    Every log, study and fit is written to the folder, where the other commands read them; report.html has all results
+    (report.pdf with the pdf extra). Ctrl-C keeps and reports what is finished; the same call continues from there.
 
     Parameters
     ----------
     experiment : str or sequence of str, optional
-        Only these of 1, 1a, 1b, 2, 2b, 3, 4, and what they stand on.
+        Only these of 1, 1a, 1b, 2, 2b, 3, 4, and those they depend on.
     rig : str, optional
-        Twin of a make, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
+        Twin of a rig model, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
     seed : int
         Random seed of the rig model; 0 is nominal. On hardware, that of the rigs drawn from its fit.
     out : path, optional
         Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
-        Make again what the folder holds already.
+        Run again what the folder has already.
     quick : bool
-        Instead of experiments a minute at the rig of RIG.toml, without hands: how it is wired, dead zone, drive and
-        delay, a fit, gains, swing-up and catch.
+        A minute at the rig of RIG.toml instead of the experiments, without hands: wiring, dead zone, drive and delay, a
+        fit, gains, swing-up and catch.
     workers : int, str or executor
-        Who runs experiments that need nothing of each other: processes of this machine, the address of a Dask
+        Number of processes for independent experiments, the address of a Dask
         scheduler, or an executor of `concurrent.futures`.
     nonideal : bool
         Twins with physics that models leave out, of which fits read as those of real rigs do.
     accept : str, optional
-        Why laws from a fit that is not trusted drive hardware all the same; the logs keep it. Without it such laws are
-        not armed.
+        Reason for running laws on hardware although their fit is not trusted; stored in the logs. Without it such laws
+        are not armed.
     progress : callable, optional
         Called with the current step and the share completed.
     ask : callable, optional
@@ -153,7 +152,7 @@ def lab(
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
     rig = os.fspath(rig) if isinstance(rig, os.PathLike) else "" if rig is None else rig
     if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
-        raise BadInput(f"a laboratory's rig is a make, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
+        raise BadInput(f"a laboratory's rig is a rig model, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
     itself = rig.endswith(".toml") or rig.startswith("serial:")
     if rig and not itself:
         make_named(rig)
@@ -237,7 +236,7 @@ def _live(
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
     if not Path(rig).exists():
-        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a make: linear, furuta, ...")
+        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a rig model: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
         raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")

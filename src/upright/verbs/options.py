@@ -27,7 +27,7 @@ Options = TypeVar("Options", bound=Mapping[str, Any])
 
 
 class RigOptions(TypedDict, total=False):
-    """What a rig is that neither its study nor its data sheet says, or says otherwise.
+    """Properties of a rig that its study and data sheet leave out, or that replace theirs.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class RigOptions(TypedDict, total=False):
     counts : float, str, sequence or mapping, optional
         Encoder counts per turn or metre, "4096", "20000, 4096" or "x=20000, theta=4096"; the study's when omitted.
     vendor : str, optional
-        Whose data sheet says what neither the call nor the study does: "ECP 205" or "ECP 210".
+        Data sheet for what neither the call nor the study states: "ECP 205" or "ECP 210".
     """
 
     limit: float | str | None
@@ -53,7 +53,7 @@ class TravelOptions(RigOptions, total=False):
     Parameters
     ----------
     travel : float or str, optional
-        How far the driven body may go either way, "30 cm", "120 deg" or a number [m or rad]; the study's when omitted.
+        Travel of the driven body either way, "30 cm", "120 deg" or a number [m or rad]; the study's when omitted.
     """
 
     travel: float | str | None
@@ -65,9 +65,9 @@ class LoopOptions(RigOptions, total=False):
     Parameters
     ----------
     speed : str, optional
-        Velocities by plain or filtered difference, or kalman; filtered when omitted.
+        Velocity estimator: plain or filtered difference, or kalman; filtered when omitted.
     memory : float, optional
-        Of the filtered difference, 0 to 1; 0.5 when omitted.
+        Coefficient of the filtered difference, 0 to 1; 0.5 when omitted.
     """
 
     speed: str | None
@@ -84,8 +84,8 @@ class TrialOptions(HoldingOptions, total=False):
     Parameters
     ----------
     start : str or mapping, optional
-        Of the pendulum when it is let go, from upright and outwards: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}``
-        [SI]; 5 degrees at rest, or what its rig model says, when omitted.
+        Start of the pendulum, from upright and moving outwards: ``"12 deg"``, ``{"theta": 0.2, "theta_dot": 1.5}``
+        [SI]; 5 degrees at rest, or the rig model's own start, when omitted.
     seconds : float, optional
         Length of a run; 6 when omitted, 3 in a page.
     draws : int, optional
@@ -103,12 +103,12 @@ class RunOptions(TypedDict, total=False):
     Parameters
     ----------
     reference : str, optional
-        A signal as of `excite`, for the coordinate that the law's design tracks [rad or m].
+        Signal that the tracked coordinate follows, written as for `excite` [rad or m].
     mode : str, optional
         ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
     accept : str, optional
-        Why a law whose model is not trusted drives hardware all the same; the log keeps it. Without it such a law is
-        not armed.
+        Reason for running a law on hardware although its model is not trusted; stored in the log. Without it such a law
+        is not armed.
     """
 
     reference: str | None
@@ -122,14 +122,14 @@ class DesignOptions(LoopOptions, total=False):
     Parameters
     ----------
     effort_weight : float, optional
-        Weight of the effort; the limit decides when omitted.
+        Weight of the effort; set by the limit when omitted.
     track : str, optional
         Coordinate that follows a reference.
     sampled : bool, optional
-        Gains whose sampled loop has the requested poles.
+        Place the poles of the sampled loop instead of the continuous one.
     delay : float, optional
-        How many samples late a command acts in all; when omitted the fit's delay, or one where it has none. StateSpace
-        matrices hold their own.
+        Total delay of the command in samples; when omitted the fit's, or one sample if it has none. StateSpace matrices
+        have their own.
     lag : float or str, optional
         Lag of the drive [s]; the fit's when omitted.
     """

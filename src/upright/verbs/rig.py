@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     "Control",
     names={"rig": "--rig", "start": "--start --tilt"},
     metavars={
-        "rig": "RIG.toml", "law": "GAIN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
+        "rig": "RIG.toml", "law": "DESIGN.json", "excite": "SIGNAL", "reference": "SIGNAL", "duration": "SECONDS",
         "start": "ANGLE", "accept": "REASON",
     },
     helps={
-        "rig": "What the rig is, and how far it may go.",
-        "law": "Law to run: design.json of upright design.",
-        "reference": 'That the law follows: "square 0.3 8".',
-        "duration": "How long.",
+        "rig": "Description and limits of the rig.",
+        "law": "Law to run: design.json of `upright design`.",
+        "reference": 'Signal that the law follows: "square 0.3 8".',
+        "duration": "Length of the run.",
     },
     wrong=lambda answer: not answer.value.sound,  # whether it ran, whatever its model is worth
     more="""
-    Space, q, Esc or Ctrl-C stop it: zero first.
+    Space, q, Esc or Ctrl-C stop it; the command goes to zero first.
     This is software, not a rated safety function: keep a stop in hardware within reach.
 
     upright run --rig RIG.toml --law design/design.json --duration 30
@@ -54,11 +54,10 @@ def run(
     out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "", **on: Unpack[RunOptions],
 ) -> Answer[RigRun]:  # fmt: skip
-    """Run a law, or a signal, on a rig: supervised, watched, logged, judged.
+    """Run a law or a signal on a rig, supervised and logged, and evaluate the run.
 
-    The encoders are zeroed where the rig hangs, a small pulse is compared with the model, then you bring it where it is
-    to be held. A rig of hardware runs by the clock on the wall in a process of its own; twins and replays in virtual
-    time.
+    The encoders are zeroed while the rig hangs, a small pulse is compared with the model, then you move it to where it
+    is to be stabilised. Hardware runs in real time in a process of its own; twins and replays in virtual time.
 
     Parameters
     ----------
@@ -67,17 +66,17 @@ def run(
     law : path, optional
         design.json of `design`.
     excite : str, optional
-        Instead of a law, a signal put out blindly: ``"free"``, ``"step 0.5"``, ``"square 0.5 2"``, ``"sine 0.5 1.2"``,
+        Open-loop signal instead of a law: ``"free"``, ``"step 0.5"``, ``"square 0.5 2"``, ``"sine 0.5 1.2"``,
         ``"sweep 0.5 0.5 10"`` [command unit, s, Hz].
     duration : float
         [s].
     start : str or mapping, optional
-        Deviation of the last coordinate when the hand of a twin lets go, ``"5 deg"``; a number is [rad or m]. Under a
-        law 3 degrees, or 3 mm, when omitted, so that there is something to see.
+        Deviation of a twin's last coordinate when it is released, ``"5 deg"``; a number is [rad or m]. Under a law 3
+        degrees, or 3 mm, when omitted.
     check : bool
         Compare a small pulse with the model first.
     watch : bool
-        Tell wrong encoders and a weak drive from hands and friction beside the loop.
+        Monitor the loop for faulty encoders and a weak drive.
     out : path
         Folder for the log and the page.
     pdf : bool
@@ -203,7 +202,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
 @command(
     name="rig doctor",
     metavars={"rig": "RIG.toml"},
-    helps={"rig": "What the rig is, and how far it may go."},
+    helps={"rig": "Description and limits of the rig."},
     prepare=_for_hardware,
     wrong=lambda answer: not answer.chapter.sound,
     more="""

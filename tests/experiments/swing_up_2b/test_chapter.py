@@ -105,13 +105,13 @@ def test_the_way_up_is_a_table_of_what_the_log_shows():
 
 
 def test_lies_are_counted_by_who_notices_them_and_when():
-    """Of four lies three are found hanging; two fall, and a watch speaks before one of them."""
-    lies = (
+    """Of four faults three are found hanging; two fall, and a watch speaks before one of them."""
+    faults = (
         lie(), lie(factor=4.0, spoke=0.5, fell=0.3),
         lie(refused=False, spoke=math.inf, tilt=0.0, suspicion="", fell=math.inf),
         lie(fell=math.inf),
     )  # fmt: skip
-    told = chapter(experiment(climbed(), faulty=lies))
+    told = chapter(experiment(climbed(), faulty=faults))
     points, table = told.parts[2].content
     assert points.sentences == (
         "Hanging, 3 of 4 faults are detected before a loop is closed. A loop started 3 degrees from upright falls with "
@@ -121,18 +121,18 @@ def test_lies_are_counted_by_who_notices_them_and_when():
     assert table.rows[1] == ("theta", "4", "0.4999", "500", "7.5", "theta", "300")
     assert table.rows[2] == ("theta", "−0.5", "0.4999", "–", "–", "–", "stands")
     assert table.numbers == (1, 2, 3, 4, 6)
-    assert told.numbers["lies_tried"] == len(FAULTS)
-    assert told.numbers["lies"][0]["fell"] == 0.2345
-    assert chapter(experiment(climbed())).numbers["lies_tried"] == 0
+    assert told.numbers["faults_tried"] == len(FAULTS)
+    assert told.numbers["faulty_encoders"][0]["fell"] == 0.2345
+    assert chapter(experiment(climbed())).numbers["faults_tried"] == 0
 
 
 def test_the_next_step_follows_from_what_came_of_it():
     own = chapter(experiment(climbed(), source="fit.json"))
     export = "upright export FOLDER/swing_up.json --to c"
-    assert [s.command for s in own.steps] == [export, 'upright swing-up fit.json --seed 3 --lie "theta=2"']
+    assert [s.command for s in own.steps] == [export, 'upright swing-up fit.json --seed 3 --fault "theta=2"']
     sheet = [s.command for s in chapter(experiment(climbed())).steps]
     assert sheet == [
-        export, 'upright swing-up --rig furuta --seed 3 --lie "theta=2"', "upright swing-up FIT.json --seed 3",
+        export, 'upright swing-up --rig furuta --seed 3 --fault "theta=2"', "upright swing-up FIT.json --seed 3",
     ]  # fmt: skip
     lost = [s.command for s in chapter(experiment(climbed(caught=99), source="fit.json")).steps]
     assert lost[0] == "upright swing-up fit.json --seed 3 --travel 3"  # twice as far

@@ -205,7 +205,7 @@ def test_a_gain_begins_where_the_start_inertia_swings_as_far_as_was_seen(plant, 
     assert guessed_gain(plant, low=-1.3, high=-0.7) == pytest.approx(guessed_gain(plant))
     assert guessed_gain(plant, low=0.0, high=0.0) == 1e-9
     # 409 counts of ECP's converter are half a volt
-    dac = {"low": -1636.0, "high": 1227.0, "lies": ("the command in DAC counts",)}
+    dac = {"low": -1636.0, "high": 1227.0, "remarks": ("the command in DAC counts",)}
     assert guessed_gain(plant, command=dac) == pytest.approx(guessed_gain(plant), rel=2e-3)
     assert guessed_gain(plant, command={"low": 0.0, "high": 0.0}) == pytest.approx(2 * guessed_gain(plant))
 

@@ -34,7 +34,7 @@ from upright.study.draft.recognise import (
 def col(name: str, guess: str = "", **more: Any) -> Column:
     about: dict[str, Any] = {
         "unit": "", "low": 0.0, "high": 1.0, "resolution": Resolution(), "constant": False, "low_share": 0.0,
-        "high_share": 0.0, "turns": 0, "drive": False, "idle": False, "switches": (), "stepwise": False, "lies": (),
+        "high_share": 0.0, "turns": 0, "drive": False, "idle": False, "switches": (), "stepwise": False, "remarks": (),
     }  # fmt: skip
     return Column(name=name, guess=guess, **(about | more))
 
@@ -204,8 +204,8 @@ def test_degrees_that_were_guessed_are_doubted():
 
 
 def test_converter_counts_are_known_by_their_sentence():
-    assert in_dac_counts(col("u", lies=("other", "the command in DAC counts (819 per V: 409 = 0.5 V)")))
-    assert not in_dac_counts(col("u", lies=("the reference (levels 0 and 100)",)))
+    assert in_dac_counts(col("u", remarks=("other", "the command in DAC counts (819 per V: 409 = 0.5 V)")))
+    assert not in_dac_counts(col("u", remarks=("the reference (levels 0 and 100)",)))
     assert not in_dac_counts(col("u"))
 
 

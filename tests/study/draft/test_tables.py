@@ -38,7 +38,7 @@ def comments(*tables: TomlTable) -> dict[str, str]:
     ("column", "unit", "factor"),
     [
         (col("u", "V"), "V", 1.0), (col("u", "V", unit="mV"), "V", 1e-3), (col("u"), "", 1.0),
-        (col("u", "kN"), "N", 1e3), (col("u", "N mm"), "N m", 1e-3), (col("u", "counts", lies=DAC), "V", 1 / 819),
+        (col("u", "kN"), "N", 1e3), (col("u", "N mm"), "N m", 1e-3), (col("u", "counts", remarks=DAC), "V", 1 / 819),
     ],
 )  # fmt: skip
 def test_a_command_has_its_unit_without_a_prefix_or_that_of_its_converter(column, unit, factor):
@@ -190,7 +190,7 @@ def test_a_driven_cart_pendulum_starts_from_a_gain_that_moves_it_as_far():
     assert "sign" not in study["sensors"]["x"]
     assert study["defaults"] == {"unknown": ["initial"]}
     counted = {"x": col("x", "counts", high=1000.0), "theta": PENDULUM}
-    dac = col("u", "counts", low=0.0, high=819.0, lies=DAC)
+    dac = col("u", "counts", low=0.0, high=819.0, remarks=DAC)
     gain = drafted(shown("cart-pendulum", counted, drive=dac, frequency=0.0))["actuator"]["gain"]["guess"]
     assert gain == f"{1.1 * 500 * 4e-4 * 36:.3g} N/V"
 
@@ -356,7 +356,7 @@ def test_nobody_measured_the_limit_that_a_log_shows():
     ],
 )
 def test_a_log_of_converter_counts_is_an_ecp_rigs(plant, guess, high, vendor, travel):
-    dac = col("u", "counts", drive=True, low=0.0, high=819.0, lies=DAC)
+    dac = col("u", "counts", drive=True, low=0.0, high=819.0, remarks=DAC)
     first = "x" if plant == "cart-pendulum" else "psi"
     columns = {first: col(first, guess, high=high), "theta": PENDULUM}
     seen = replace(SEEN, columns=(dac,))

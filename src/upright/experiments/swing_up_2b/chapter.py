@@ -93,6 +93,6 @@ def _numbers(result: SwingUpRun, verdict: str) -> dict[str, Any]:
             "K": law.K, "P": law.P, "size": law.size, "sure": law.sure, "reach": law.reach,
             "limit": law.limit, "travel": law.travel, "held_for": HELD, "body": vars(law.body),
         },
-        "lies": [vars(fault) for fault in result.faulty],
-        "lies_tried": len(FAULTS) if result.faulty else 0,
+        "faulty_encoders": [vars(fault) for fault in result.faulty],
+        "faults_tried": len(FAULTS) if result.faulty else 0,
     }  # fmt: skip

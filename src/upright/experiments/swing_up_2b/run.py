@@ -89,8 +89,8 @@ class SwingUpRun:
     check : Scales
         What that says of the encoders.
     ascent : Ascent or None
-        None when the encoders lie: then no loop is closed.
-    lies : tuple of Lie
+        None when an encoder is faulty: then no loop is closed.
+    faulty : tuple of FaultyEncoder
     source : str
         File that the model comes from, as typed; empty for the data sheet.
     seconds : float
@@ -232,7 +232,7 @@ def run_swing_up(
     progress("designing swing-up and catch", 0.0)
     room = stand.travel if travel is None and math.isfinite(stand.travel) else travel
     law = design_swing_up(model, travel=room, speeds=stand.speeds)
-    progress("asking the encoders", 0.3)
+    progress("checking the encoders", 0.3)
     command = probe(model, law)
     log = _coasted(stand, command, folder)
     check = scales(model, log, known)
@@ -240,7 +240,7 @@ def run_swing_up(
     ascent = _ascended(stand, law, folder, seconds) if check.sound else None
     tried: tuple[FaultyEncoder, ...] = ()
     if stand.exact is not None and check.sound and not stopped():
-        progress("trying encoders that lie", 0.6)
+        progress("trying faulty encoders", 0.6)
         tried = _faulty_encoders(model, stand.exact, law, command, known)
     log.to_csv(folder / "sensors.csv")
     if ascent is not None:

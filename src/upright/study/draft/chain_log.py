@@ -162,7 +162,7 @@ def _bodies(record: Record, inspection: Inspection, recognised: Recognised) -> l
         c.name: replace(c, guess=unit)
         for c in inspection.columns
         if c.name not in bodies and not c.drive and (c.guess in kinds or (c.constant and not c.guess))
-        and not any(lie.startswith("the same as") for lie in c.lies)
+        and not any(remark.startswith("the same as") for remark in c.remarks)
         and not (c.constant and c.low == 0 and len(bodies) > 1)  # a board has more inputs than the rig has encoders
         and re.search(r"enc|pos|dis[ck]|cart|^(x|theta)_?\d", c.name, re.IGNORECASE)
     }  # fmt: skip
@@ -212,9 +212,9 @@ def chain_kind(
 def _reference(inspection: Inspection) -> Column | None:
     """What a loop was to follow: a stepping column that is called so or is seen to be one."""
     for c in inspection.columns:
-        lies = " ".join(c.lies)
-        steps_ = c.drive and c.stepwise and not c.constant and not re.search("follows|DAC|same as", lies)
-        if steps_ and ("the reference" in lies or REFERENCE.search(c.name)):
+        remarks = " ".join(c.remarks)
+        steps_ = c.drive and c.stepwise and not c.constant and not re.search("follows|DAC|same as", remarks)
+        if steps_ and ("the reference" in remarks or REFERENCE.search(c.name)):
             return c
     return None
 

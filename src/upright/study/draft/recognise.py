@@ -144,7 +144,7 @@ def position_columns(record: Record, inspection: Inspection) -> list[Column]:
     """Columns that measure a place and move, without speeds, drives, clocks and liars."""
     kinds = (*ANGLES, *LENGTHS, "counts", "")
     places = [c for c in inspection.columns if not c.drive and c.name not in record.inputs and c.guess in kinds]
-    columns = [c for c in places if not (c.constant or _lies(c, inspection))]
+    columns = [c for c in places if not (c.constant or _mislabelled(c, inspection))]
     columns = [
         c for c in columns if not RATE.search(c.name) and not _is_speed(record, c.name, [o.name for o in columns])
     ]
@@ -160,11 +160,11 @@ def position_columns(record: Record, inspection: Inspection) -> list[Column]:
     ]
 
 
-def _lies(c: Column, inspection: Inspection) -> bool:
-    """Whether a column is not what it is called; of two equal ones, the reference or the later one lies."""
+def _mislabelled(c: Column, inspection: Inspection) -> bool:
+    """Whether a column is not what it is called; of two equal ones, it is the reference or the later one."""
     names = [o.name for o in inspection.columns]
     earlier = [f"the same as '{o.name}'" for o in inspection.columns[: names.index(c.name)] if not o.drive]
-    return any(not lie.startswith("the same as") or lie in earlier for lie in c.lies)
+    return any(not remark.startswith("the same as") or remark in earlier for remark in c.remarks)
 
 
 def _is_speed(record: Record, name: str, others: list[str]) -> bool:
@@ -204,7 +204,7 @@ TO_AND_FRO = 4
 
 def in_dac_counts(c: Column) -> bool:
     """Whether a column holds the command in counts of ECP's converter."""
-    return any(lie.startswith("the command in DAC counts") for lie in c.lies)
+    return any(remark.startswith("the command in DAC counts") for remark in c.remarks)
 
 
 def drive_column(record: Record, inspection: Inspection) -> Column | None:
@@ -217,7 +217,9 @@ def drive_column(record: Record, inspection: Inspection) -> Column | None:
     if dac is not None:
         return dac
     candidates = [c for c in inspection.columns if c.drive and not c.constant]
-    candidates = [c for c in candidates if all(lie.startswith("the first samples are outliers") for lie in c.lies)]
+    candidates = [
+        c for c in candidates if all(remark.startswith("the first samples are outliers") for remark in c.remarks)
+    ]
     candidates = [c for c in candidates if not REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name) or effort_unit(c.name)]
     drive = (effort or candidates or [None])[0]

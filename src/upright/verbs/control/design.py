@@ -37,14 +37,14 @@ _poles = read_pole_list  # the verbs have options of this name
 @command(
     "Control",
     metavars={
-        "source": "STUDY_ORFIT", "matrices": "FILE", "at": "NAME", "lqr": "LIST", "effort_weight": "R",
-        "start": "LIST", "delay": "SAMPLES", "speed": "WAY", "lag": "TIME", "track": "COORDINATE",
+        "source": "FIT|STUDY", "matrices": "FILE", "at": "NAME", "lqr": "LIST", "effort_weight": "R",
+        "start": "LIST", "delay": "SAMPLES", "speed": "ESTIMATOR", "lag": "TIME", "track": "COORDINATE",
     },
     helps={
         "source": "fit.json, its folder, or a study (TOML).",
-        "speed": "Velocities: plain, filtered or kalman; of matrices also measured or observer.",
+        "speed": "Velocity estimator: plain, filtered or kalman; for matrices also measured or observer.",
         "matrices": "Plain matrices instead: TOML with A and B; C, D, dt, names, units if any.",
-        "start": 'Deviation to come back from, as in "theta=5 deg, psi_dot=0.2 rad/s".',
+        "start": 'Deviation to recover from, as in "theta=5 deg, psi_dot=0.2 rad/s".',
     },
     defaults={"out": "."},
     more="""
@@ -62,9 +62,9 @@ def design(
 ) -> Answer[Designed]:  # fmt: skip
     """Find gains that stabilise a rig, and evaluate the loop as a computer runs it.
 
-    The numbers are those identified (hanging, for instance); the model is the one about another equilibrium, upright.
-    Poles are placed by Ackermann's formula, or chosen by LQR, or proposed where neither is requested; period, delay and
-    differenced encoders are then put in.
+    The parameters are those identified, hanging for instance; the linear model is about another equilibrium, such as
+    upright. Poles are placed by Ackermann's formula, chosen by LQR, or proposed when neither is requested. The loop is
+    evaluated with servo period, delay and velocities from encoder differences.
 
     Parameters
     ----------
@@ -83,10 +83,10 @@ def design(
     lqr : str or sequence of float
         Weights of the states, as in ``"1,0,1,0"``, instead of poles.
     start : str or mapping, optional
-        Deviation to come back from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI]; a value alone is of
+        Deviation to recover from, by state: ``{"theta": "5 deg"}``, ``{"theta": 0.087}`` [SI]; a value alone is of
         the last coordinate.
     seed : int
-        Of the rigs drawn from the fit's covariance.
+        Random seed of the rigs drawn from the fit's covariance.
     out : path, optional
         Folder for design.json and design.html.
     pdf : bool

@@ -31,8 +31,8 @@ def play(
 ) -> Played:  # fmt: skip
     """Write a page with a live twin: push it, drag its poles, see which rigs of the fit are stabilised.
 
-    The rig is simulated in the page, with dry friction, delay, encoder counts and limit; no request leaves it. Beside
-    it the rigs that the covariance of the fit allows run under the same law at every change.
+    The rig is simulated in the page, with dry friction, delay, encoder counts and limit; the page works offline. Rigs
+    drawn from the fit's covariance run beside it under the same law, again at every change.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ def play(
     poles : str or sequence of complex
         Closed-loop poles to begin with [1/s]; proposed as by `design` when omitted.
     seed : int
-        Of the rigs that are drawn.
+        Random seed of the rigs drawn from the fit's covariance.
     log : path, Record or pandas.DataFrame, optional
-        A run of the rig: the page plays it, measured and as the fit predicts it, with a slider of time.
+        Log of a run to play in the page, measured and predicted, with a slider for time.
     out : path, optional
         Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
     **on

@@ -29,12 +29,12 @@ _poles = read_pole_list  # the verbs have options of this name
     "Control",
     defaults={"out": "upright-regulate"},
     names={"which": "--set"},
-    metavars={"source": "[FIT]", "rig": "MAKE", "which": "N", "start": "LIST"},
+    metavars={"source": "[FIT]", "rig": "MODEL", "which": "N", "start": "LIST"},
     helps={
         "source": FIT + "a twin is identified without it.",
         "which": "Pole set of Table 1, 1 to 4, or all.",
         "poles": 'Poles [1/s] of your own: "-4.15+-1.63j, -16, -3".',
-        "start": 'Of the pendulum when let go: "12 deg", or "theta=12 deg, theta_dot=1.5 rad/s".',
+        "start": 'Start of the pendulum: "12 deg" from upright, or "theta=12 deg, theta_dot=1.5 rad/s".',
     },
     ranges={"draws": (1, None)},
     more="""
@@ -50,11 +50,11 @@ def regulate(
     poles: str | Iterable[complex] | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
     workers: Workforce = 1, progress: Progress = silent, **on: Unpack[TrialOptions],
 ) -> Answer[Regulation]:  # fmt: skip
-    """Compare pole sets that hold a rig upright: the predicted probability of each, then the runs.
+    """Compare pole sets that stabilise a rig upright: the predicted probability of each, then the runs.
 
-    Gains are placed on the numbers identified while the rig hung. What will come is simulated with limit, counts, delay
-    and dry friction, on rigs as the fit's covariance allows; the laws then run on a twin, and both are put side by
-    side.
+    Gains are placed on the numbers identified while the rig hung. Each set is simulated with limit, encoder counts,
+    delay and dry friction, on rigs drawn from the fit's covariance. The laws then run on a twin; predicted and measured
+    stand side by side.
 
     Parameters
     ----------
@@ -62,10 +62,10 @@ def regulate(
         What `identify` answered, fit.json or its folder, or a plant with its numbers; a twin is identified when
         omitted.
     rig : str, optional
-        Twin to identify: furuta or linear; with a fit, the make whose vendor is chosen.
+        Twin to identify, furuta or linear; with a fit, the rig model whose vendor is chosen.
     seed : int, optional
-        Which twin of the make runs, or which rig that the fit's covariance allows where no vendor is named; with a fit
-        and no seed nothing is run.
+        Random seed of the twin that runs: of its rig model, or, where no vendor is named, of a rig drawn from the fit's
+        covariance. With a fit and no seed nothing runs.
     which : int or str, optional
         Pole set of Table 1, 1 to 4, or all; the command line's ``--set``.
     poles : str or sequence of complex, optional
@@ -75,7 +75,7 @@ def regulate(
     pdf : bool
         Write the page as PDF too.
     workers : int, str or executor
-        Who simulates those rigs: processes of this machine, the address of a Dask scheduler, or an executor of
+        Number of processes of this machine, the address of a Dask scheduler, or an executor of
         `concurrent.futures`; the numbers are the same.
     progress : callable, optional
         Called with the current step and the share completed.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
+from upright.renamed import LIE, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.handover import called, rig_of
@@ -26,11 +27,12 @@ if TYPE_CHECKING:
 @command(
     "Control",
     defaults={"out": "swing-up"},
-    metavars={"source": "[FIT]", "lie": "NAME=FACTOR", "check": "LOG"},
+    metavars={"source": "[FIT]", "fault": "NAME=FACTOR", "check": "LOG"},
     helps={
         "source": FIT + "the law is designed from it, else from the data sheet.",
-        "lie": 'An encoder shows a multiple of what is true: "theta=2".',
+        "fault": 'A faulty encoder, which shows FACTOR times the true value: "theta=2".',
     },
+    names={"fault": "--fault --lie"},
     ranges={"seconds": (1.0, 120.0)},
     wrong=lambda answer: not answer.value.sound,  # whatever its model is worth
     more="""
@@ -42,34 +44,35 @@ if TYPE_CHECKING:
     upright swing-up out/fit.json --check swings.csv
     """,
 )
+@renamed(LIE)
 @written_where_named
 @keeps_its_inputs
 def swing_up(
     source: Any = None, *, rig: str | None = None, seed: int = 1, seconds: float = 12.0,
-    lie: str | Mapping[str, float] | None = None,
+    fault: str | Mapping[str, float] | None = None,
     check: Log | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
     **on: Unpack[TravelOptions],
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
     """Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.
 
-    The drive's limit and travel are kept. The law is designed from a fit, or from the make's data sheet, and meets a
-    twin with numbers of its own. Logs can be shown, identified and predicted as any other.
+    The swing-up stays within the drive's limit and travel. The law is designed from a fit, or from the rig model's data
+    sheet, and runs on a twin with different true parameters. `upright show`, `identify` and `predict` read its logs.
 
     Parameters
     ----------
     source : fit, path or plant, optional
-        What `identify` answered, or the fit.json that the law is designed from; the make's data sheet when omitted.
+        Fit that the law is designed from, or its fit.json; the rig model's data sheet when omitted.
     rig : str, optional
-        furuta or linear; with a fit, the make whose vendor is chosen.
+        Rig model, furuta or linear; with a fit, the one whose vendor is chosen.
     seed : int
-        Which rig of the make, 0 is the one as designed; or which rig that the fit's covariance allows where no vendor
-        is named.
+        Random seed of the rig model, 0 is nominal; where no vendor is named, of the rig drawn from the fit's
+        covariance.
     seconds : float
-        Time for the way up and for holding, 1 to 120 s.
-    lie : str or mapping, optional
-        An encoder shows a multiple of what is true: ``{"theta": 2}``.
+        Time to swing up and hold, 1 to 120 s.
+    fault : str or mapping, optional
+        A faulty encoder, which shows a multiple of the true value: ``{"theta": 2}``.
     check : path, Record or pandas.DataFrame, optional
-        Only say what this log of a hanging, driven rig tells of its encoders.
+        Check the encoders only, on this log of a hanging, driven rig.
     out : path, optional
         Folder for all files; in Python none is written without one.
     pdf : bool
@@ -122,7 +125,7 @@ def swing_up(
         page = check_chapter(model, scales, log.name, name or "FIT.json")
         page = replace(page, warnings=(*page.warnings, *doubt))
         return Answer(scales, page, write_page(page, at / "encoders.html", pdf))
-    travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_faulty(truth, lie))
+    travel, stand = above_zero(on, "travel", driven_unit(type(model.plant))), TwinStand(rig=_faulty(truth, fault))
     result = run_swing_up(model, stand, at, known=known, seconds=seconds, travel=travel, source=name)
     page = chapter(result, typed(at))
     page = replace(page, warnings=(*page.warnings, *doubt))
@@ -131,24 +134,24 @@ def swing_up(
     )
 
 
-def _faulty(rig: Rig, lie: str | Mapping[str, float] | None) -> Rig:
+def _faulty(rig: Rig, fault: str | Mapping[str, float] | None) -> Rig:
     """The rig with one encoder that shows a multiple of what is true."""
-    if isinstance(lie, str):
-        lies = [(name.strip(), value.strip()) for name, _, value in [lie.partition("=")] if lie.strip()]
+    if isinstance(fault, str):
+        faults = [(name.strip(), value.strip()) for name, _, value in [fault.partition("=")] if fault.strip()]
     else:
-        lies = [(name, str(value)) for name, value in (lie or {}).items()]
+        faults = [(name, str(value)) for name, value in (fault or {}).items()]
     names = [c.name for c in rig.plant.coordinates]
     factors = dict.fromkeys(names, 1.0)
-    for name, value in lies:
+    for name, value in faults:
         if name not in names:
-            raise BadInput(f"--lie names a coordinate as in \"theta=2\", got '{name}'; {nearest(name, names)}")
+            raise BadInput(f"--fault names a coordinate as in \"theta=2\", got '{name}'; {nearest(name, names)}")
         try:
             factor = float(value)
         except ValueError:
             factor = 0.0
         if not 0.01 <= abs(factor) <= 100:
             raise BadInput(
-                f"--lie needs a factor between 0.01 and 100, or negative for swapped channels, got '{value}'."
+                f"--fault needs a factor between 0.01 and 100, or negative for swapped channels, got '{value}'."
             )
         factors[name] = factor
-    return replace(rig, scales=tuple(factors.values())) if lies else rig
+    return replace(rig, scales=tuple(factors.values())) if faults else rig

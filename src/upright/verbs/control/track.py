@@ -63,7 +63,7 @@ def track(
     rig : str
         Twin to run on: rectilinear (ECP 210) or torsional (ECP 205).
     seed : int
-        Which twin of the make; 0 is the one as designed.
+        Random seed of the rig model; 0 is nominal.
     sets : str, int or sequence of int, optional
         Sets of Table 2, the command line's ``--set``; all when neither they nor poles are given.
     poles : str or sequence of complex, optional

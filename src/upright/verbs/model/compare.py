@@ -70,8 +70,8 @@ def _is_fit(path: Path) -> bool:
 
     upright compare viscous-fit coulomb-fit OTHER.toml -o compared
 
-    Exit code: 0 a fit predicts what none has seen, better than an equation
-    without physics; 3 none does, or nothing tests them; 2 a file is wrong.
+    Exit code: 0 a fit predicts unseen runs better than the black-box baseline; 3 none does, or there is no unseen run;
+    2 a file is wrong.
     """,
 )
 @keeps_its_inputs
@@ -79,18 +79,18 @@ def compare(
     fits: Sequence[Any], log: Any = None, *, data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None, pdf: bool = False,
 ) -> ComparisonAnswer:  # fmt: skip
-    """Compare fits with each other, with an equation without physics and with a run that none has seen.
+    """Compare fits with each other, with a black-box (ARX) baseline, and on a run that none was fitted to.
 
     Every fit predicts the second half of each run; a linear difference equation (ARX), fitted to its first half, is
-    the baseline that physics must beat. Parameters stand beside each other with their intervals, and a two-sided test
-    says which differ.
+    the baseline that physics must beat. Parameters are listed side by side with their intervals; a two-sided test marks
+    those that differ.
 
     Parameters
     ----------
     fits : sequence of answers of `identify` or paths
         What `identify` answered, fit.json files, or their folders.
     log : path, Study, Record or pandas.DataFrame, optional
-        Runs to predict. Without it the runs that studies of fits in memory hold out, if no fit has seen them.
+        Runs to predict; when omitted, the runs that the fits' studies hold out.
     data : path, optional
         Folder the runs' files are in; the study's own when omitted.
     out : path, optional

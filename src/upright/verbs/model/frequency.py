@@ -98,9 +98,9 @@ def frequency(
     sources : path or sequence of paths, optional
         Logs (repeats together), a frequency.csv, or a study; a twin when omitted.
     rig : str
-        Twin, or make of the logged rig: furuta, linear, rectilinear, torsional.
+        Twin, or rig model of the logged rig: furuta, linear, rectilinear, torsional.
     seed : int
-        Which twin of the make; 0 is the one as designed.
+        Random seed of the rig model; 0 is nominal.
     ask : str
         Ask the twin by sines, multisine or sweep.
     data : path, optional

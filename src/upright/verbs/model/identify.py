@@ -79,7 +79,7 @@ def _keys() -> str:
     prepare=_read_first,
     wrong=lambda answer, keys, strict: strict and not answer.fit.trusted,
     more="""
-    A study names a rig and the runs that speak about it:
+    A study describes a rig and its runs:
 
         [rig]
         plant = "pendulum"      # cart-pendulum, furuta, torsional-2, my.py:MyRig

@@ -58,7 +58,7 @@ def loadings(
     twin : str, optional
         No logs: step a twin, rectilinear or torsional.
     seed : int
-        Which twin of the make; 0 is the one as designed.
+        Random seed of the rig model; 0 is nominal.
     out : path, optional
         Folder for the page, and for the logs of a twin.
     pdf : bool

@@ -48,9 +48,9 @@ def predict(
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
     """Predict other runs with a fitted model, and score the prediction.
 
-    Every run is scored, whatever its role. What a run lists under ``unknown`` (its initial state, unless it says
-    otherwise) is estimated for that run alone; nothing else is. Around each prediction lies a band that should hold 90
-    % of the samples, as the fit promises; a run that goes beyond what was fitted is named, and by how much.
+    Every run is scored, whatever its role. Only what a run lists under ``unknown`` (its initial state by default) is
+    estimated for that run. Each prediction has a band that should hold 90 % of the samples. A run that goes beyond the
+    fitted commands, speeds or angles is named, with by how much.
 
     Parameters
     ----------
