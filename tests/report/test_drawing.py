@@ -165,6 +165,19 @@ def test_markup_in_a_page_has_ids_of_its_own_and_is_as_wide_as_it_was_drawn():
     assert 'style="max-width:100%"' in svg(figure(1.0, 2 * WIDTH), "wide")
 
 
+def test_markup_in_a_page_is_well_formed_where_groups_are_empty_too():
+    """An axis without labels and a curve without points are empty groups."""
+    from xml.etree import ElementTree
+
+    drawing = figure(1.0)
+    ax = drawing.add_subplot()
+    ax.plot([], [])
+    ax.scatter([], [])
+    ax.fill_between([], [], [])
+    text = svg(drawing, "a").replace("<svg", '<svg xmlns:xlink="http://www.w3.org/1999/xlink"', 1)
+    assert ElementTree.fromstring(text).tag == "svg"
+
+
 def places(path: str) -> np.ndarray:
     """Points of a path of straight lines, by the rules of SVG: M and L absolute, l relative."""
     here, points, command = np.zeros(2), [], ""

@@ -189,6 +189,8 @@ class _Ungrouped:
         self.kept: list[bool] = []
 
     def __call__(self, tag: re.Match[str]) -> str:
+        if tag[0].endswith("/>"):
+            return ""  # empty
         if tag[0] == "</g>":
             return tag[0] if self.kept.pop() else ""
         self.kept.append(not re.fullmatch(r'<g(?: id="[^"]*")?>', tag[0]))
