@@ -7,13 +7,17 @@ import hashlib
 import math
 import re
 from collections.abc import Iterator, Sequence
+from functools import cache
 from html import unescape
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from upright.files import replace_file
 from upright.report.page import Block, Book, Chapter, KeyNumber, Live, Part, Picture, Table
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
@@ -82,13 +86,17 @@ def picture_in_notebook(picture: Picture) -> str:
 
 def rendered(package: str, template: str, **values: Any) -> str:
     """A template of a package with its values, texts escaped but for `markupsafe.Markup`."""
+    return _templates_of(package).get_template(template).render(**values)
+
+
+@cache
+def _templates_of(package: str) -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    templates = Environment(
+    return Environment(
         loader=PackageLoader(package, "templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    return templates.get_template(template).render(**values)
 
 
 def _rendered(template: str, **values: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from upright.verbs.answer import Answer
 from upright.verbs.command import command
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.rigs.firmware import Flashed, Image, Pin
 
 _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT", "brake": "TIME"}
@@ -28,8 +28,8 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 )
 @keeps_its_inputs
 def firmware_build(
-    *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None,
-    brake: float | str | None = None, out: str | os.PathLike[str] = "upright-firmware",
+    *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
+    brake: float | str | None = None, out: PathLike = "upright-firmware",
 ) -> Answer[Image]:  # fmt: skip
     """Make the image that goes onto a board.
 
@@ -88,8 +88,8 @@ def firmware_build(
     """,
 )
 def firmware_flash(
-    *, board: str = "mega", drive: str = "analog", rig: str | os.PathLike[str] | None = None,
-    brake: float | str | None = None, port: str | None = None, out: str | os.PathLike[str] = "upright-firmware",
+    *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
+    brake: float | str | None = None, port: str | None = None, out: PathLike = "upright-firmware",
     hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
     """Build the image, write it to a board once you agree, and verify it.
@@ -142,7 +142,7 @@ def firmware_flash(
 
 @command(name="firmware pins", metavars={**_METAVARS, "out": "DRAWING.svg"})
 def firmware_pins(
-    *, board: str = "mega", drive: str = "analog", out: str | os.PathLike[str] | None = None
+    *, board: str = "mega", drive: str = "analog", out: PathLike | None = None
 ) -> Answer[tuple[Pin, ...]]:
     """List which wire goes to which pin, from the table that the firmware is compiled with.
 
@@ -183,7 +183,7 @@ def firmware_pins(
     )  # fmt: skip
 
 
-def _ceilings(rig: str | os.PathLike[str] | None, brake: float | str | None, drive: str) -> dict[str, int]:
+def _ceilings(rig: PathLike | None, brake: float | str | None, drive: str) -> dict[str, int]:
     """A rig's own limits, and for how long it brakes [ticks], as its board can be compiled for them."""
     from upright.errors import BadInput
     from upright.rigs.firmware.boards import PAIR
