@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import upright as up
@@ -152,6 +153,33 @@ def test_poles_of_sampled_matrices_are_those_whose_motion_outlasts_a_third_of_a_
     rows = {row[0]: row[1] for row in tables(told)[1].rows}
     assert rows["model, open loop"][1:] == "3, and 1 faster"  # behind its minus
     assert "faster" not in rows["requested"]
+
+
+def test_the_file_of_a_double_integrator_s_design_holds_what_can_be_worked_out_by_hand():
+    """u = -6 x - 5 v moves by -2 and -3 1/s; from x = 1 it begins with its peak, 6. A filtered difference of 2 ms
+    keeps half of the last one, so that v = 250 (x - x_before) + v_before/2."""
+    model = StateSpace(A=[[0.0, 1.0], [0.0, 0.0]], B=[[0.0], [1.0]], C=[[1.0, 0.0]], states=("x", "v"), outputs=("x",),
+                       inputs=("a",))  # fmt: skip
+    done = design_for(model, DesignRequest(at="", poles=(-2.0, -3.0), period=2e-3, limit=10.0, start=(1.0, 0.0)))
+    told = chapter(done).numbers
+    np.testing.assert_allclose(told["K"], [6.0, 5.0], rtol=1e-9)
+    np.testing.assert_allclose(np.sort(told["poles"]["asked"].real), [-3, -2])
+    np.testing.assert_allclose(np.sort(told["poles"]["attained"].real), [-3, -2], rtol=1e-9)
+    np.testing.assert_allclose(told["poles"]["open_loop"], 0.0, atol=1e-9)
+    assert told["worst_miss"] < 1e-9
+    assert told["condition"] == pytest.approx(1.0)  # one input places two poles in one way
+    assert told["peak_command"] == pytest.approx(6.0)
+    assert told["peak_command_sampled"] == pytest.approx(6.0)
+    assert (told["states"], told["command"], told["period"], told["limit"]) == (["x", "v"], "a", 2e-3, 10.0)
+    assert (told["delay_samples"], told["lag"], told["converter"], told["effort_weight"]) == (1.0, 0.0, 0.0, None)
+    assert told["readings"] == [{"name": "x", "unit": "1", "step": 0.0, "sign": 1.0}]
+    law = told["law"]
+    np.testing.assert_allclose(law["A"], [[0, 0], [-250, 0.5]])  # of x_before and v_before
+    np.testing.assert_allclose(law["D"], [[-6 - 5 * 250, 0.0]], rtol=1e-9)
+    np.testing.assert_allclose(law["C"], [[5 * 250, -5 * 0.5]], rtol=1e-9)
+    without = chapter(replace(done, placement=None)).numbers
+    assert (without["poles"]["asked"], without["poles"]["attained"]) == (None, None)
+    assert (without["worst_miss"], without["condition"]) == (None, None)
 
 
 def test_the_converter_of_the_drive_goes_into_the_file_and_none_where_nobody_named_one(done):

@@ -401,20 +401,21 @@ def test_an_arm_that_must_have_moved_forty_counts_is_missed():
     still = StillDrive(rig, "inverted")
     linear = rig.linear("inverted")
     held = 2.0 * rig.plant.b_1c / rig.gain
-    u = 3 * held
+    u, shown = 3 * held, 2.5 / rig.per_unit[1]  # its pendulum goes up and down, as on all that moves
     acceleration = abs(linear.B[1, 0]) * (u - held)
     assert 40 / rig.per_unit[0] > abs(linear.B[1, 0]) * held * 0.1**2 / 4
     expected = math.sqrt(2 * 40 / rig.per_unit[0] / acceleration) / rig.period
     for command in (u, -u):
         still = StillDrive(rig, "inverted")
-        ticks = next(k for k in range(1, 5000) if still.sees(0.5, [0.0, 0.0], command))
+        ticks = next(k for k in range(1, 5000) if still.sees(0.5, [0.0, (k % 2) * shown], command))
         assert ticks == pytest.approx(expected, abs=3)
     still = StillDrive(rig, "inverted")
-    assert not any(still.sees(0.5, [0.0, 0.0], 0.99 * held) for _ in range(3000))
+    assert not any(still.sees(0.5, [0.0, (k % 2) * shown], 0.99 * held) for k in range(3000))
     # each count begins anew
     still = StillDrive(rig, "inverted")
-    assert not any(still.sees(0.5 + (k // 20), [0.0, 0.0], u) for k in range(1000))
+    assert not any(still.sees(0.5 + (k // 20), [0.0, (k % 2) * shown], u) for k in range(1000))
     # a lean pulls like a command
     still = StillDrive(rig, "inverted")
     lean = u * linear.B[1, 0] / linear.A[1, 2]
-    assert next(k for k in range(1, 5000) if still.sees(0.5, [0.0, lean], 0.0)) == pytest.approx(expected, abs=3)
+    ticks = next(k for k in range(1, 5000) if still.sees(0.5, [0.0, lean + (k % 2 - 0.5) * shown], 0.0))
+    assert ticks == pytest.approx(expected, abs=3)

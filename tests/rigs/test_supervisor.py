@@ -331,7 +331,7 @@ def test_a_command_that_has_just_jumped_has_not_yet_moved_the_arm_that_friction_
         assert not still.sees(0.1, [0.0, 0.0], command)
     assert way * RIG.per_unit[0] < 10
     for _ in range(100):
-        if still.sees(0.1, [0.0, 0.0], 5.0):
+        if still.sees(0.1, [0.0, MODEL.B[3, 0] / MODEL.B[1, 0] * way], 5.0):  # the pendulum goes along
             break
         way, speed = way + speed * RIG.period, speed + MODEL.B[1, 0] * 5.0 * RIG.period
     # free of friction it had gone `UNSEEN` counts by then, and not much more: friction takes 0.5 % of 5 V

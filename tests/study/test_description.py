@@ -124,6 +124,18 @@ def cart(tmp_path, log):
     return write
 
 
+def test_a_rig_has_its_study_s_numbers_each_with_its_source_and_the_drive_in_its_unit(cart):
+    stated = CART.replace('"0.1 kg"', '{ value = "0.1 kg", assumed = true }').replace(
+        "[actuator]", 'b_1 = { guess = "0.3 N s/m" }\n[actuator]'
+    )
+    rig = load_study(cart(stated)).rig
+    assert (rig.plant.m_c, rig.plant.m_p, rig.plant.l_cg, rig.plant.b_1) == (0.5, 0.1, 0.2, 0.3)
+    said = {"m_c": "known", "m_p": "assumed", "l_cg": "known", "J_p": "known", "b_1": "guessed"}
+    assert {n: rig.sources[n] for n in said} == said
+    assert rig.sources["actuator.gain"] == "guessed"
+    assert (rig.gain, rig.unit) == (4.0, "V")
+
+
 def test_a_fit_hands_on_the_drive_the_encoders_and_the_servo(cart, tmp_path):
     study = load_study(cart())
     fit = identify(study.model, study.runs)

@@ -100,6 +100,10 @@ def test_a_law_faster_than_the_rows_needs_its_period(tmp_path: Path) -> None:
     run = run_of(tmp_path, WRITTEN.replace("kp = 4", 'kp = 4, period = "0.4 ms"'))
     assert run.loop.every == 5
     assert run.loop.law.period == pytest.approx(T / 5)
+    # each row's reference for the five samples from there on, and the last one for the last
+    for k in (0, 1, 700, RECORD.t.size - 2):
+        np.testing.assert_allclose(run.loop.law.references[5 * k : 5 * k + 5, 0], RECORD["r"][k], atol=1e-9)
+    assert len(run.loop.law.references) == 5 * (RECORD.t.size - 1) + 1
 
 
 @pytest.mark.parametrize(

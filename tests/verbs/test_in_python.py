@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -54,3 +55,18 @@ def test_a_verb_keeps_its_signature_and_can_be_sent_to_another_process():
     assert inspect.signature(up.identify) == inspect.signature(identify)
     assert up.identify.__doc__ == identify.__doc__
     assert pickle.loads(pickle.dumps(up.identify)) is up.identify
+
+
+VERBS = sorted(
+    name for name in up.__all__ if inspect.isfunction(getattr(up, name)) and name not in ("quantity", "chain")
+)
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_a_signature_says_what_a_verb_takes_and_has_ten_parameters_at_most(name):
+    """What more there is stands in one options object; progress and its kin are callables, said as such."""
+    parameters = inspect.signature(getattr(up, name)).parameters.values()
+    assert len(parameters) <= 10 + any(p.kind is p.VAR_KEYWORD for p in parameters)
+    for p in parameters:
+        annotation = str(p.annotation)
+        assert not re.fullmatch(r"(str \| )?(typing\.)?Any( \| None)?|Sequence\[Any\]|object", annotation), p.name

@@ -117,7 +117,7 @@ def _kind(parameter: inspect.Parameter) -> Any:
     for kind in (bool, int, float):
         if isinstance(default, kind):
             return kind
-    if re.search(r"Path|\bLog\b", text) or (text == "Any" and not isinstance(default, str)):
+    if re.search(r"Path|\bLog\b|(Rig|Fit|Study)Like", text):
         return Path
     return next((kind for kind in (str, float, int, bool) if re.search(rf"\b{kind.__name__}\b", text)), str)
 

@@ -1,9 +1,10 @@
 """Must an encoder that shows not a single count have moved? Distinguishes friction from a dead counter.
 
 The driven body stands still where its command is within friction, for as long as it likes; beyond `HELD_BY` times the
-friction that the model knows of, it moves. The pendulum on it stands still, to a count, only while what carries it is
-accelerated against what its lean makes of it: ``theta'' = psi''/rho + a_33 theta``, where hinges hold little and the
-lean is known to `OUT_OF_TRUE`. What else holds either is a hand; and where nothing moves at all, nobody can tell.
+friction that the model knows of, it moves, and disturbs the pendulum on it. That pendulum stands still, to a count,
+only while what carries it is accelerated against what its lean makes of it: ``theta'' = psi''/rho + g/l theta``, with
+g/l that of a pendulum on a wall, where hinges hold little and the lean is known to `OUT_OF_TRUE`. What else holds
+either is a hand; and where nothing moves at all, nobody can tell.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from upright.rig import Rig
 UNSEEN, EXCESS, FOR = 40, 0.5, 0.1
 """A driven body cannot have moved by so many counts without its encoder showing one; nor as far as half of what holds
 it at most takes it in so long [s], since a hand and friction of the day may be so much more."""
+DISTURBED = 2
+"""Nor without that the pendulum on it goes up or down by so many counts: where both stand still, to a count, friction
+and a hand hold them. Upright nothing balances by itself, and a body that moves has a law that answers."""
 SWUNG, LEAST_SWUNG = 0.02, 12
 """Nor a pendulum by such an angle [rad], and by so many counts."""
 STIRRED = 0.25
@@ -40,18 +44,23 @@ class StillDrive:
         self._drive, self._period = float(linear.B[row, 0]), model.period
         self._held = held_by(model, at)
         self._least = max(UNSEEN / model.per_unit[self.which], EXCESS * self._held * FOR**2 / 2)
+        self._disturbed = (DISTURBED - 0.5) / model.per_unit[1 - self.which]
         self._shown, self._speed, self._way = math.nan, 0.0, 0.0
+        self._lowest, self._highest = 0.0, 0.0
 
     def sees(self, reading: float, away: Sequence[float], command: float) -> bool:
         """Take a sample with its deviations and command; whether the body must have moved since its last count."""
+        pendulum = away[1 - self.which]
         if reading != self._shown:
             self._shown, self._speed, self._way = reading, 0.0, 0.0
+            self._lowest = self._highest = pendulum
+        self._lowest, self._highest = min(self._lowest, pendulum), max(self._highest, pendulum)
         pushed = sum(a * q for a, q in zip(self._pull, away, strict=True)) + self._drive * command
         forward = math.copysign(1.0, self._speed or pushed)
         self._way += self._speed * self._period
         # friction takes what it can, and turns nothing round
         self._speed = forward * max(0.0, forward * self._speed + (forward * pushed - self._held) * self._period)
-        return abs(self._way) > self._least
+        return abs(self._way) > self._least and self._highest - self._lowest > self._disturbed
 
 
 class StillPendulum:
@@ -62,9 +71,10 @@ class StillPendulum:
         B = linear.B[1::2, 0]
         self._body = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
         self.which = 1 - self._body
-        self._gravity = float(linear.A[2 * self.which + 1, 2 * self.which])
-        self.name = model.plant.coordinates[self.which].name
         self._rho, self._period = float(B[self._body] / B[self.which]), model.period
+        pull = linear.A[1::2, 2 * self.which]  # of a lean; a body that is free gives way to it
+        self._gravity = float(pull[self.which] - pull[self._body] / self._rho)
+        self.name = model.plant.coordinates[self.which].name
         self._least = max(SWUNG, LEAST_SWUNG / model.per_unit[self.which])
         self._shown, self._behind = math.nan, math.nan
         self._from, self._speed, self._for, self._seconds = 0.0, 0.0, 0.0, 0.0

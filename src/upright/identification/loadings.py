@@ -9,7 +9,7 @@ search must find.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -25,9 +25,6 @@ Array = NDArray[np.float64]
 
 NORMAL = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
-
-MOST = 20_000
-"""Designs compared for one number of runs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -278,7 +275,7 @@ def plan_loadings(
     tolerance, piece : float
         Relative standard uncertainty of one added piece, and its inertia; the same pieces serve every loading.
     levels : int
-        Different loadings at least: two fix a line, the third shows whether it is one.
+        Different loadings: two fix a line, the third shows whether it is one; a further one tightens nothing.
 
     Raises
     ------
@@ -295,9 +292,10 @@ def plan_loadings(
         raise BadInput("A plan needs a positive bare inertia and a positive error of one frequency, such as 0.2 %.")
     if tolerance > 0 and piece <= 0:
         raise BadInput("A tolerance of the pieces needs the inertia of one piece.")
+    cuts = combinations(range(1, runs), levels - 1)
+    shares = np.array([np.diff([0, *cut, runs]) for cut in cuts], dtype=np.int64)
     plans: list[Plan] = []
-    for used, shares in _designs(len(differing), runs, levels):
-        loadings = tuple(differing[i] for i in used)
+    for loadings in combinations(differing, levels):
         k, m, both = _promise(np.array([w.added for w in loadings]), shares, bare, error, tolerance, piece)
         for i in dict.fromkeys((int(np.argmin(k)), int(np.argmin(both)))):
             plans.append(
@@ -305,17 +303,6 @@ def plan_loadings(
                      both=float(both[i]))
             )  # fmt: skip
     return min(plans, key=lambda plan: plan.k), min(plans, key=lambda plan: plan.both)
-
-
-def _designs(size: int, runs: int, levels: int) -> Generator[tuple[tuple[int, ...], NDArray[np.int64]]]:
-    """Every choice of loadings with every way to share the runs; exactly `levels` loadings where more are too many."""
-    for used in range(levels, min(size, runs) + 1):
-        if used > levels and math.comb(size, used) * math.comb(runs - 1, used - 1) > MOST:
-            return
-        cuts = list(combinations(range(1, runs), used - 1))
-        shares = np.array([np.diff([0, *cut, runs]) for cut in cuts], dtype=np.int64)
-        for chosen in combinations(range(size), used):
-            yield chosen, shares
 
 
 def _promise(

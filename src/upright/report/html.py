@@ -7,13 +7,18 @@ import hashlib
 import math
 import re
 from collections.abc import Iterator, Sequence
+from functools import cache
 from html import unescape
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from upright.files import replace_file
 from upright.report.page import Block, Book, Chapter, KeyNumber, Live, Part, Picture, Table
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
@@ -82,13 +87,17 @@ def picture_in_notebook(picture: Picture) -> str:
 
 def rendered(package: str, template: str, **values: Any) -> str:
     """A template of a package with its values, texts escaped but for `markupsafe.Markup`."""
+    return _templates_of(package).get_template(template).render(**values)
+
+
+@cache
+def _templates_of(package: str) -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    templates = Environment(
+    return Environment(
         loader=PackageLoader(package, "templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    return templates.get_template(template).render(**values)
 
 
 def _rendered(template: str, **values: Any) -> str:
@@ -100,8 +109,15 @@ def _rendered(template: str, **values: Any) -> str:
 
     return rendered(
         "upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__,
-        tone=tone, breadth=breadth, brief=brief, scale=shared_scale, evidence=evidence,
+        framed=framed, tone=tone, breadth=breadth, brief=brief, scale=shared_scale, evidence=evidence,
     )  # fmt: skip
+
+
+def framed(page: str) -> Markup:
+    """A page as it stands in the attribute of a frame; only what would end the attribute or begin a tag is escaped."""
+    from markupsafe import Markup
+
+    return Markup(page.replace("&", "&amp;").replace('"', "&#34;").replace("<", "&lt;"))
 
 
 def tone(state: str) -> str:

@@ -213,10 +213,9 @@ def _closed_loop(
     elif factor < 0:
         law = law.in_units(np.ones(law.readings), np.zeros(law.readings), factor)
     rows = max((r.size for r in references), default=1)
-    stacked = np.column_stack([np.broadcast_to(r, rows) for r in references]) if references else None
-    if stacked is not None and every > 1 and rows > 1:
-        stacked = np.repeat(stacked, every, axis=0)[: (rows - 1) * every + 1]
-    return ClosedLoop(law=replace(law, references=stacked), every=every, quantized=section.flag("quantized"))
+    held = [np.repeat(np.broadcast_to(r, rows), every)[: (rows - 1) * every + 1] for r in references]
+    law = replace(law, references=np.column_stack(held) if held else None)
+    return ClosedLoop(law=law, every=every, quantized=section.flag("quantized"))
 
 
 def limited(section: Section, law: Law) -> Law:

@@ -104,7 +104,7 @@ def _placed(readings: Array, zero: float, factor: float, step: float | None) -> 
     Angles on the grid of an encoder's `step` [SI] are put there; 250 mm are 0.25 m to the last bit.
     """
     values = factor * readings
-    if step and np.abs(values).max() < FAR_OFF * step:
+    if step:
         on_grid = np.round(values / step) * step
         if 1e-12 * step < float(np.abs(values - on_grid).max()) < ROUNDED * step:
             return on_grid - factor * zero
@@ -113,8 +113,8 @@ def _placed(readings: Array, zero: float, factor: float, step: float | None) -> 
     return factor * (readings - zero)
 
 
-ROUNDED, FAR_OFF = 1e-3, 1e8
-"""Share of an encoder's step within which its text has to lie, and steps beyond which float64 has no room for that."""
+ROUNDED = 1e-3
+"""Share of an encoder's step within which its text has to lie."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
@@ -18,6 +18,7 @@ from upright.progress import Progress, silent
 from upright.renamed import WORN, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.options import LabOptions, known_options
 from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import texts
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from upright.experiments.laboratory import Session
     from upright.experiments.stand.live import LiveStand
+    from upright.files import PathLike
     from upright.paper.reproduce import Reproduced
     from upright.questionnaire.sheet import Means, Ratings, Shares
     from upright.realtime.session import RunState
@@ -94,11 +96,11 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
 )
 @renamed(WORN)
 def lab(
-    *, experiment: Sequence[str] | str | None = None, rig: str | None = None, seed: int = 0,
-    out: str | os.PathLike[str] | None = None, fresh: bool = False, quick: bool = False, workers: Workforce = 1,
-    nonideal: bool = False, accept: str | None = None, progress: Progress = silent,
+    *, experiment: Sequence[str] | str | None = None, rig: str | None = None, out: PathLike | None = None,
+    fresh: bool = False, quick: bool = False, workers: Workforce = 1, progress: Progress = silent,
     ask: Callable[[str], bool] | None = None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None = None,
+    **on: Unpack[LabOptions],
 ) -> Answer[Laboratory]:  # fmt: skip
     """Run the paper's experiments, on simulated rigs or on hardware, and write one report.
 
@@ -112,8 +114,6 @@ def lab(
     rig : str, optional
         Twin of a rig model, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
-    seed : int
-        Random seed of the rig model; 0 is nominal. On hardware, that of the rigs drawn from its fit.
     out : path, optional
         Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
     fresh : bool
@@ -124,17 +124,14 @@ def lab(
     workers : int, str or executor
         Number of processes for independent experiments, the address of a Dask
         scheduler, or an executor of `concurrent.futures`.
-    nonideal : bool
-        Twins with physics that models leave out, of which fits read as those of real rigs do.
-    accept : str, optional
-        Reason for running laws on hardware although their fit is not trusted; stored in the logs. Without it such laws
-        are not armed.
     progress : callable, optional
         Called with the current step and the share completed.
     ask : callable, optional
         Asks the person beside a rig for something, in a sentence; answers whether it was done. Hardware needs it.
     watching : callable, optional
         Opens a view for each run at a rig: shown how it goes, it answers with a sentence to end the run.
+    **on
+        Of the rig: seed, nonideal, accept; see `LabOptions`.
 
     Returns
     -------
@@ -148,6 +145,8 @@ def lab(
     """
     from upright.rig.makes import make_named
 
+    on = known_options(LabOptions, on, "lab")
+    seed, nonideal, accept = on.get("seed", 0), on.get("nonideal", False), on.get("accept")
     if seed < 0:
         raise BadInput(f"--seed needs a whole number of at least 0, got {seed}.")
     rig = os.fspath(rig) if isinstance(rig, os.PathLike) else "" if rig is None else rig
@@ -273,7 +272,7 @@ def _ctrl_c() -> Generator[_Pressed]:
 
 @command("Course", defaults={"out": "."}, more="upright reproduce -o out")
 def reproduce(
-    *, seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False
+    *, seed: int = 0, out: PathLike | None = None, pdf: bool = False
 ) -> Answer[Reproduced]:  # fmt: skip
     """Regenerate the paper's pole tables from a few numbers, and show its misprints.
 
@@ -316,8 +315,8 @@ def reproduce(
 )
 @keeps_its_inputs
 def survey(
-    file: str | os.PathLike[str] | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    file: PathLike | DataFrame, *, n: int | None = None, scale: str | tuple[int, int] = "1-4",
+    out: PathLike | None = None, pdf: bool = False,
 ) -> Answer[Ratings | Means | Shares]:  # fmt: skip
     """Evaluate ratings before and after a course, or check printed means and percentages.
 

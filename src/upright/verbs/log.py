@@ -20,12 +20,14 @@ from upright.verbs.values import open_log, texts
 if TYPE_CHECKING:
     from upright.closed_loop import Recovery
     from upright.diagnosis import Diagnosis
+    from upright.files import PathLike
     from upright.physics import Plant
     from upright.readers import Inspection
     from upright.records import Record
     from upright.report.page import Step
     from upright.rig import Rig
     from upright.study.sensors import Wiring
+    from upright.verbs.forms import PlantLike
     from upright.verbs.values import Log
 
 
@@ -57,7 +59,7 @@ def read(file: Log, *, reader: str | None = None, time_unit: str | None = None) 
 
 @keeps_its_inputs
 def show(
-    log: Log, *, out: str | os.PathLike[str] | None = None, plot: bool = False, time_unit: str | None = None
+    log: Log, *, out: PathLike | None = None, plot: bool = False, time_unit: str | None = None
 ) -> Answer[Inspection]:
     """What a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
@@ -105,9 +107,9 @@ def show(
 
 @command("Log", name="show", metavars={"time_unit": "UNIT"}, more="upright show swing.csv")
 def show_logs(
-    logs: Sequence[str | os.PathLike[str]],
+    logs: Sequence[PathLike],
     *,
-    out: str | os.PathLike[str] = ".",
+    out: PathLike = ".",
     plot: bool = True,
     time_unit: str | None = None,
 ) -> Iterator[Answer[Inspection]]:
@@ -176,7 +178,7 @@ def _stem(log: Path) -> str:
 )
 @keeps_its_inputs
 def doctor(
-    log: Log, *, rig: str | Any = None, html: str | os.PathLike[str] | None = None, pdf: bool = False,
+    log: Log, *, rig: PlantLike | None = None, html: PathLike | None = None, pdf: bool = False,
     reader: str | None = None,
 ) -> Answer[Diagnosis]:  # fmt: skip
     """Say in plain sentences what looks wrong with a log, with the evidence and what to do.
@@ -305,7 +307,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
 )
 @keeps_its_inputs
 def init(
-    log: Log, *, out: str | os.PathLike[str] | None = None, plant: str | None = None, reader: str | None = None,
+    log: Log, *, out: PathLike | None = None, plant: str | None = None, reader: str | None = None,
     time_unit: str | None = None,
     force: bool = False,
 ) -> Answer[str]:  # fmt: skip
@@ -396,7 +398,7 @@ def init(
     )
 
 
-def _init_from_mjcf(path: Path, out: str | os.PathLike[str] | None, force: bool) -> Answer[str]:
+def _init_from_mjcf(path: Path, out: PathLike | None, force: bool) -> Answer[str]:
     """Study of the rig that an MJCF file describes."""
     from upright.report.page import Chapter, Part, Points, Step
     from upright.report.symbols import typed
@@ -431,7 +433,7 @@ def _init_from_mjcf(path: Path, out: str | os.PathLike[str] | None, force: bool)
 def law(
     log: Log, *, command: str | None = None, measured: Sequence[str] | str | None = None,
     reference: Sequence[str] | str | None = None, feedforward: Sequence[str] | str | None = None,
-    every: int | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    every: int | None = None, out: PathLike | None = None, pdf: bool = False,
 ) -> Answer[Recovery]:  # fmt: skip
     """Recover the control law from a closed-loop log: structure, gains, limit, and what it leaves unexplained.
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.rig import Rig
 
 
-def from_mjcf(file: str | os.PathLike[str]) -> Rig:
+def from_mjcf(file: PathLike) -> Rig:
     """Rig of a MuJoCo model (MJCF), where its bodies are one of upright's plants.
 
     Read are a pendulum, one on a cart or on an arm (Furuta), two links, a flexible link, and up to nine carts or disks

@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,19 +18,20 @@ from upright.records import Record
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
 from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin
+from upright.verbs.options import MotionOptions, known_options
 
 if TYPE_CHECKING:
     from upright.rig import Rig
-    from upright.systems import StateSpace
+    from upright.systems import LinearForm, StateSpace
+    from upright.verbs.forms import LawLike, RigLike
 
 Array = NDArray[np.float64]
 
 
 def simulate(
-    plant: Any, law: Any = None, *, start: Mapping[str, Any] | ArrayLike | None = None, seconds: float | str = 5.0,
-    at: str | None = None, u: float | Callable[[float], Any] | ArrayLike | None = None, dt: float | str | None = None,
-    limit: float | str | None = None, counts: float | Mapping[str, float] | None = None, memory: float = 0.0,
-    actuator: Mapping[str, float] | None = None,
+    plant: RigLike | LinearForm, law: LawLike | None = None, *, start: Mapping[str, Any] | ArrayLike | None = None,
+    seconds: float | str = 5.0, at: str | None = None, u: float | Callable[[float], Any] | ArrayLike | None = None,
+    dt: float | str | None = None, **on: Unpack[MotionOptions],
 ) -> Record:  # fmt: skip
     """Motion of a plant, free, driven, or with its loop closed by gains or a law.
 
@@ -53,14 +54,8 @@ def simulate(
         Command, in the unit of the input or of the rig's command; it is added to the law's.
     dt : float or str, optional
         Between samples [s]; the period that gains or law are for, else the rig's, else 1 ms.
-    limit : float or str, optional
-        Largest command; the rig's when omitted, none of a plant alone.
-    counts : float or mapping of coordinate to float, optional
-        Encoder counts per turn or metre; without it readings are not rounded.
-    memory : float
-        Of the low pass on the differences, 0 to below 1.
-    actuator : mapping, optional
-        Numbers of the drive, such as ``{"gain": 0.5, "lag": 2e-3, "delay": 1e-3}``.
+    **on
+        Of the rig and its loop: limit, counts, memory, actuator; see `MotionOptions`.
 
     Returns
     -------
@@ -76,6 +71,8 @@ def simulate(
     from upright.simulation import simulate as motion
     from upright.verbs.values import si
 
+    on = known_options(MotionOptions, on, "simulate")
+    limit, counts, memory, actuator = on.get("limit"), on.get("counts"), on.get("memory", 0.0), on.get("actuator")
     if is_linear(plant):
         others = {"at": at, "counts": counts, "memory": memory or None, "actuator": actuator}
         for name in [n for n, value in others.items() if value is not None]:

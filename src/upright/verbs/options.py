@@ -97,6 +97,27 @@ class TrialOptions(HoldingOptions, total=False):
     draws: int
 
 
+class MotionOptions(TypedDict, total=False):
+    """What a motion has of a rig that the rig does not say, or says otherwise.
+
+    Parameters
+    ----------
+    limit : float or str, optional
+        Largest command; the rig's when omitted, none of a plant alone.
+    counts : float or mapping of coordinate to float, optional
+        Encoder counts per turn or metre; the rig's when omitted, and readings of a plant alone are not rounded.
+    memory : float, optional
+        Of the low pass on the differences, 0 to below 1; 0 when omitted.
+    actuator : mapping, optional
+        Numbers of the drive, such as ``{"gain": 0.5, "lag": 2e-3, "delay": 1e-3}``.
+    """
+
+    limit: float | str | None
+    counts: float | Mapping[str, float] | None
+    memory: float
+    actuator: Mapping[str, float] | None
+
+
 class RunOptions(TypedDict, total=False):
     """How a law runs on a rig.
 
@@ -104,6 +125,9 @@ class RunOptions(TypedDict, total=False):
     ----------
     reference : str, optional
         Signal that the tracked coordinate follows, written as for `excite` [rad or m].
+    start : str or mapping, optional
+        Deviation of a twin's last coordinate when it is released, ``"5 deg"``; a number is [rad or m]. Under a law 3
+        degrees, or 3 mm, when omitted.
     mode : str, optional
         ``"host"``, or ``"mcu"`` for the loop on the rig's own controller.
     accept : str, optional
@@ -111,8 +135,28 @@ class RunOptions(TypedDict, total=False):
         is not armed.
     """
 
+    start: Start | None
     reference: str | None
     mode: str | None
+    accept: str | None
+
+
+class LabOptions(TypedDict, total=False):
+    """What the rigs of a laboratory are.
+
+    Parameters
+    ----------
+    seed : int, optional
+        Random seed of the rig model, 0 when omitted, the nominal one; on hardware, of the rigs drawn from its fit.
+    nonideal : bool, optional
+        Twins with physics that models leave out, of which fits read as those of real rigs do.
+    accept : str, optional
+        Reason for running laws on hardware although their fit is not trusted; stored in the logs. Without it such laws
+        are not armed.
+    """
+
+    seed: int
+    nonideal: bool
     accept: str | None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
@@ -14,6 +13,7 @@ from upright.errors import BadInput
 from upright.verbs.answer import Answer
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.report.page import Chapter
 
 V = TypeVar("V", bound=Callable[..., Any])
@@ -26,7 +26,7 @@ def written_where_named(verb: V) -> V:
     """
 
     @wraps(verb)
-    def answered(*arguments: Any, out: str | os.PathLike[str] | None = None, pdf: bool = False, **more: Any) -> Any:
+    def answered(*arguments: Any, out: PathLike | None = None, pdf: bool = False, **more: Any) -> Any:
         if out is not None:
             return verb(*arguments, out=out, pdf=pdf, **more)
         pdf_has_folder(out, pdf)
@@ -38,7 +38,7 @@ def written_where_named(verb: V) -> V:
     return answered  # type: ignore[return-value]
 
 
-def folder(path: str | os.PathLike[str]) -> Path:
+def folder(path: PathLike) -> Path:
     """The folder for results.
 
     Raises
@@ -52,7 +52,7 @@ def folder(path: str | os.PathLike[str]) -> Path:
     return path
 
 
-def page_folder(out: str | os.PathLike[str] | None, pdf: bool) -> Path:
+def page_folder(out: PathLike | None, pdf: bool) -> Path:
     """The folder for results; says before the work begins that a PDF cannot be made.
 
     Raises
@@ -64,7 +64,7 @@ def page_folder(out: str | os.PathLike[str] | None, pdf: bool) -> Path:
     return folder(out or "")
 
 
-def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Path | None:
+def folder_if_given(out: PathLike | None, pdf: bool = False) -> Path | None:
     """The folder for results, where one is named; says before the work begins that a PDF cannot be made.
 
     Raises
@@ -76,7 +76,7 @@ def folder_if_given(out: str | os.PathLike[str] | None, pdf: bool = False) -> Pa
     return None if out is None else folder(out)
 
 
-def pdf_has_folder(out: str | os.PathLike[str] | None, pdf: bool) -> None:
+def pdf_has_folder(out: PathLike | None, pdf: bool) -> None:
     """Refuse a PDF that cannot be made, or for which no folder is named."""
     if can_be_pdf(pdf) and out is None:
         raise BadInput("pdf writes into the folder out, and none was named; name one, or call .report('page.pdf').")

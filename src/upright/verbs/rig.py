@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -18,6 +17,7 @@ from upright.verbs.pages import folder_if_given, page_folder, write_page
 from upright.verbs.values import Start, path_of, read_start
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.realtime.jitter import Jitter
     from upright.realtime.session import RunState
     from upright.running.doctor import Checkup
@@ -49,9 +49,9 @@ if TYPE_CHECKING:
 @renamed({"tilt": ("start", lambda value: value)})
 @keeps_its_inputs
 def run(
-    rig: str | os.PathLike[str], *, law: str | os.PathLike[str] | None = None, excite: str | None = None,
-    duration: float = 30.0, start: Start | None = None, check: bool = True, watch: bool = True,
-    out: str | os.PathLike[str] = "upright-run", pdf: bool = False,
+    rig: PathLike, *, law: PathLike | None = None, excite: str | None = None,
+    duration: float = 30.0, check: bool = True, watch: bool = True,
+    out: PathLike = "upright-run", pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "", **on: Unpack[RunOptions],
 ) -> Answer[RigRun]:  # fmt: skip
     """Run a law or a signal on a rig, supervised and logged, and evaluate the run.
@@ -70,9 +70,6 @@ def run(
         ``"sweep 0.5 0.5 10"`` [command unit, s, Hz].
     duration : float
         [s].
-    start : str or mapping, optional
-        Deviation of a twin's last coordinate when it is released, ``"5 deg"``; a number is [rad or m]. Under a law 3
-        degrees, or 3 mm, when omitted.
     check : bool
         Compare a small pulse with the model first.
     watch : bool
@@ -85,7 +82,7 @@ def run(
         Shown how it goes; answers with a sentence to end the run. On hardware it has 2 s for that: who looks no more
         cannot stop it either, and it ends.
     **on
-        Of the run: reference, mode, accept; see `RunOptions`.
+        Of the run: start, reference, mode, accept; see `RunOptions`.
 
     Returns
     -------
@@ -107,7 +104,7 @@ def run(
         raise BadInput(
             f"There is no file '{rig}';{neighbour(Path(rig))} docs/howto/rigs.md says what a RIG.toml holds."
         )
-    leaning = _let_go(start, path_of(rig, "the rig that runs"), law=law is not None)
+    leaning = _let_go(on.get("start"), path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
         excite=excite or "", reference=on.get("reference") or "", seconds=duration, mode=on.get("mode") or "host",
@@ -156,7 +153,7 @@ def _let_go(start: Start | float | None, rig: Path, *, law: bool) -> float:
     """,
 )
 def rig_check(
-    *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: str | os.PathLike[str] | None = None
+    *, seconds: float = 60.0, rate: float = 1000.0, fifo: bool = True, out: PathLike | None = None
 ) -> Answer[Jitter]:
     """Measure how late this machine wakes a loop, and say whether a rate is safe on it.
 
@@ -218,7 +215,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     """,
 )
 def rig_doctor(
-    rig: str | os.PathLike[str], *, clear: bool = False, pulse: bool = True,
+    rig: PathLike, *, clear: bool = False, pulse: bool = True,
     hand: Callable[[str], bool] | None = None,
 ) -> Answer[Checkup]:  # fmt: skip
     """Walk through a rig's first power-up: link, limits, encoders by hand, pulses, stop button, travel, watchdog.

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from upright.files import PathLike
     from upright.records import Record
 
 T = TypeVar("T")
@@ -42,7 +43,7 @@ class Frame(Protocol):
 if TYPE_CHECKING:
     Workforce = int | str | Executor
     """Who shares work: a number of processes, the address of a Dask scheduler, or an executor."""
-    Log = str | os.PathLike[str] | Record | Frame
+    Log = PathLike | Record | Frame
     """A log: its file, a record, or a data frame."""
 
 

@@ -53,6 +53,23 @@ def test_two_carts_are_found_from_their_driven_motion():
     assert slow < found.fastest < 1.05 * fast
 
 
+@pytest.mark.parametrize(("second", "metre", "newton"), [(16.0, 1.0, 1.0), (1.0, 1e-3, 1.0), (1.0, 1.0, 40.0)])
+def test_numbers_of_a_chain_follow_the_units_of_time_length_and_force(second, metre, newton):
+    """What is written as 1 s, 1 m and 1 N is another one: mass, stiffness and damping scale by their dimensions."""
+    bodies = moved([2.0, 1.5], np.array([[500.0, -200], [-200, 200]]), [3.0, 2.0], SQUARE, [0, 0])
+
+    def found(second: float, metre: float, newton: float) -> ChainStarts:
+        t = 2 * T * second  # of 4 ms, so that no braking of the drive is looked for
+        return starts(t, SQUARE * newton, [x * metre for x in bodies], [True, True], plant=find("rectilinear-2"),
+                      quanta=[1e-6 * metre] * 2, loop=False)  # fmt: skip
+
+    as_it_is, scaled = found(1.0, 1.0, 1.0), found(second, metre, newton)
+    per_metre = newton / metre
+    dimension = {"m": per_metre * second**2, "c": per_metre * second, "k": per_metre, "f": newton}
+    assert scaled.numbers == pytest.approx({n: v * dimension[n[0]] for n, v in as_it_is.numbers.items()}, rel=1e-6)
+    assert scaled.fastest == pytest.approx(as_it_is.fastest / second, rel=1e-6)
+
+
 def test_free_disks_are_found_and_have_no_spring_to_ground():
     K = np.array([[2.4, -2.4], [-2.4, 2.4]])
     u = np.where(T > 0.5, 0.5, 0.0)

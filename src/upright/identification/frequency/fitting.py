@@ -262,11 +262,11 @@ def least_squares(
         sigma = _sigma(data, balance.response(values)[0], without)
         solution = walk(residual, z, jac=jacobian, bounds=(space.lower, np.inf), x_scale="jac", max_nfev=40)
         z = np.asarray(solution.x)
-    J, rows = jacobian(z), 2 * data.response.size
-    r = residual(z)[:rows]
+    rows = 2 * data.response.size
+    (r, _), (J, prior) = (np.split(x, [rows]) for x in (residual(z), jacobian(z)))
     free = max(1, rows - space.start.size + len(space.bounded))
     misfit = float(r @ r) / free
-    P = np.linalg.pinv(J[:rows].T @ J[:rows] / max(1.0, misfit) + J[rows:].T @ J[rows:])
+    P = np.linalg.pinv(J.T @ J / max(1.0, misfit) + prior.T @ prior)
     slope = space.slope(z)
     return Squares(
         way=_way("least squares", balance, space, z, data, began, ()), names=space.names,

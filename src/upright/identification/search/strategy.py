@@ -320,17 +320,13 @@ REACH, STEP = 0.6, 0.02
 def other_moments(problem: Problem, end: Descent, log: SearchLog) -> Descent:
     """The optimum after every sought moment was tried on a grid, the other numbers following from the best place."""
     for _ in range(3):
-        if end.interrupted:
-            return end
-        x = _moved(problem, end.x, end.normal.cost)
+        x = None if end.interrupted else _moved(problem, end.x, end.normal.cost)
         if x is None:
             return end
         problem.settle_steps(x)
         other = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=60)
         log.note("another moment", other.normal.cost, problem)
-        if other.interrupted or not other.normal.cost < end.normal.cost:
-            return replace(end, interrupted=other.interrupted)
-        end = other
+        end = better(end, other)
         log.best = problem, end.x
     return end
 

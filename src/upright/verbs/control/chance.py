@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
 from upright.progress import Progress, silent
@@ -14,7 +14,11 @@ from upright.verbs.options import TrialOptions, known_options, rig_entries
 from upright.verbs.values import read_start
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from upright.control.preflight import Preflight
+    from upright.verbs.forms import RigLike
+    from upright.verbs.linear.feedback import Gains
     from upright.verbs.values import Workforce
 
 UNSUPPORTED = (
@@ -25,7 +29,7 @@ UNSUPPORTED = (
 
 @renamed({**LET_GO, **CLUSTER})
 def chance(
-    fit: Any, gains: Any, *, seed: int = 0, workers: Workforce = 1, progress: Progress = silent,
+    fit: RigLike, gains: Gains | ArrayLike, *, seed: int = 0, workers: Workforce = 1, progress: Progress = silent,
     **on: Unpack[TrialOptions],
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Iterable
 from dataclasses import replace
@@ -27,9 +26,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from upright.designing.run import Designed
+    from upright.files import PathLike
     from upright.report.page import Part
     from upright.rig import Rig
-    from upright.systems import StateSpace
+    from upright.systems import LinearForm, StateSpace
+    from upright.verbs.forms import RigLike
 
 _poles = read_pole_list  # the verbs have options of this name
 
@@ -55,10 +56,10 @@ _poles = read_pole_list  # the verbs have options of this name
 )  # fmt: skip
 @keeps_its_inputs
 def design(
-    source: Any = None, *, matrices: str | os.PathLike[str] | None = None, at: str | None = None,
+    source: RigLike | LinearForm | None = None, *, matrices: PathLike | None = None, at: str | None = None,
     poles: str | Iterable[complex] | None = None, lqr: str | Iterable[float] | None = None,
     start: Start | None = None, seed: int = 0,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False, **on: Unpack[DesignOptions],
+    out: PathLike | None = None, pdf: bool = False, **on: Unpack[DesignOptions],
 ) -> Answer[Designed]:  # fmt: skip
     """Find gains that stabilise a rig, and evaluate the loop as a computer runs it.
 

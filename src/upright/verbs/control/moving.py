@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from upright.verbs.values import Start, read_pole_list, read_start
 
 if TYPE_CHECKING:
     from upright.control.score import Scores
+    from upright.files import PathLike
     from upright.identification.model.fit import RunScore
     from upright.physics import Plant
     from upright.records import Array
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def played(
     known: Rig, *, poles: str | Iterable[complex] | None = None, seed: int = 0,
-    out: str | os.PathLike[str] | None = None, **options: Any,
+    out: PathLike | None = None, **options: Any,
 ) -> Played:  # fmt: skip
     """A rig that moves in a page; arguments, result and errors as for `play`."""
     from upright.basis import SIMULATED
@@ -93,7 +93,7 @@ class PlayedRun(Played):
 
 
 def played_run(
-    score: RunScore, plant: Plant, label: str, out: str | os.PathLike[str] | None = None
+    score: RunScore, plant: Plant, label: str, out: PathLike | None = None
 ) -> PlayedRun:  # fmt: skip
     """A run, measured and simulated, in a page that plays it; written where `out` names a file ending in .html."""
     from upright.files import replace_file

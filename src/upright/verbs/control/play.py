@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
-from typing import Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.files import keeps_its_inputs
 from upright.verbs.command import command
 from upright.verbs.control.moving import Played, played, played_run
 from upright.verbs.handover import rig_of
 from upright.verbs.options import TrialOptions, known_options
+
+if TYPE_CHECKING:
+    from upright.files import PathLike
+    from upright.verbs.forms import RigLike, StudyLike
 
 
 @command(
@@ -26,8 +29,8 @@ from upright.verbs.options import TrialOptions, known_options
 )
 @keeps_its_inputs
 def play(
-    fit: Any, *, poles: str | Iterable[complex] | None = None, seed: int = 0, log: Any = None,
-    out: str | os.PathLike[str] | None = None, **on: Unpack[TrialOptions],
+    fit: RigLike, *, poles: str | Iterable[complex] | None = None, seed: int = 0, log: StudyLike | None = None,
+    out: PathLike | None = None, **on: Unpack[TrialOptions],
 ) -> Played:  # fmt: skip
     """Write a page with a live twin: push it, drag its poles, see which rigs of the fit are stabilised.
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
@@ -20,6 +19,8 @@ from upright.verbs.values import read_pole_list, read_start
 
 if TYPE_CHECKING:
     from upright.experiments.regulation_2.run import Regulation, RegulationRequest
+    from upright.files import PathLike
+    from upright.verbs.forms import RigLike
     from upright.verbs.values import Workforce
 
 _poles = read_pole_list  # the verbs have options of this name
@@ -46,8 +47,8 @@ _poles = read_pole_list  # the verbs have options of this name
 @written_where_named
 @keeps_its_inputs
 def regulate(
-    source: Any = None, *, rig: str | None = None, seed: int | None = None, which: int | str | None = None,
-    poles: str | Iterable[complex] | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    source: RigLike | None = None, *, rig: str | None = None, seed: int | None = None, which: int | str | None = None,
+    poles: str | Iterable[complex] | None = None, out: PathLike | None = None, pdf: bool = False,
     workers: Workforce = 1, progress: Progress = silent, **on: Unpack[TrialOptions],
 ) -> Answer[Regulation]:  # fmt: skip
     """Compare pole sets that stabilise a rig upright: the predicted probability of each, then the runs.

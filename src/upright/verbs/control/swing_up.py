@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
@@ -20,7 +19,9 @@ from upright.verbs.values import open_log
 if TYPE_CHECKING:
     from upright.control.sensors import Scales
     from upright.experiments.swing_up_2b.run import SwingUpRun
+    from upright.files import PathLike
     from upright.rig import Rig
+    from upright.verbs.forms import RigLike
     from upright.verbs.values import Log
 
 
@@ -48,9 +49,9 @@ if TYPE_CHECKING:
 @written_where_named
 @keeps_its_inputs
 def swing_up(
-    source: Any = None, *, rig: str | None = None, seed: int = 1, seconds: float = 12.0,
+    source: RigLike | None = None, *, rig: str | None = None, seed: int = 1, seconds: float = 12.0,
     fault: str | Mapping[str, float] | None = None,
-    check: Log | None = None, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    check: Log | None = None, out: PathLike | None = None, pdf: bool = False,
     **on: Unpack[TravelOptions],
 ) -> Answer[SwingUpRun | Scales]:  # fmt: skip
     """Swing a hanging pendulum up by its own drive and catch it, once its encoders are trusted.

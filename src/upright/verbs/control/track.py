@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
@@ -20,6 +19,8 @@ from upright.verbs.values import read_pole_list, si_if_given
 
 if TYPE_CHECKING:
     from upright.experiments.tracking_3.run import Tracking
+    from upright.files import PathLike
+    from upright.verbs.forms import RigLike
 
 _poles = read_pole_list  # the verbs have options of this name
 
@@ -43,10 +44,10 @@ _poles = read_pole_list  # the verbs have options of this name
 @written_where_named
 @keeps_its_inputs
 def track(
-    source: Any = None, *, rig: str = "rectilinear", seed: int = 0,
+    source: RigLike | None = None, *, rig: str = "rectilinear", seed: int = 0,
     sets: str | int | Sequence[int] | None = None, poles: str | Iterable[complex] | None = None,
     step: float | str | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+    out: PathLike | None = None, pdf: bool = False, progress: Progress = silent,
     **on: Unpack[RigOptions],
 ) -> Answer[Tracking]:  # fmt: skip
     """Step the far end of a flexible shaft, by state feedback and by PD.

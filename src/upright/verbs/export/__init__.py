@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from typing import Any
+from typing import TYPE_CHECKING
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
@@ -12,6 +11,14 @@ from upright.verbs.command import command
 from upright.verbs.export.law import controller_of, write_law
 from upright.verbs.export.rig import write_rig
 from upright.verbs.pages import folder
+
+if TYPE_CHECKING:
+    from upright.control.sensors import Scales
+    from upright.designing.run import Designed
+    from upright.experiments.swing_up_2b.run import SwingUpRun
+    from upright.files import PathLike
+    from upright.laws import Law, Rule
+    from upright.verbs.forms import RigLike
 
 
 @command(
@@ -31,8 +38,8 @@ from upright.verbs.pages import folder
 )
 @keeps_its_inputs
 def export(
-    source: Any, *, to: str, out: str | os.PathLike[str] = "upright-export", single: bool = False,
-    limit: float | None = None,
+    source: RigLike | Law | Rule | Answer[Designed] | Answer[SwingUpRun | Scales], *, to: str,
+    out: PathLike = "upright-export", single: bool = False, limit: float | None = None,
 ) -> Answer[tuple[str, ...]]:  # fmt: skip
     """Write a designed law as a program that tests itself, or an identified rig for other simulators.
 

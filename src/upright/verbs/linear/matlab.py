@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from upright.errors import BadInput, nearest
-from upright.files import read_bytes
+from upright.files import PathLike, read_bytes
 from upright.readers.matlab import Variables, variables
 from upright.readers.source import Source
 from upright.systems import StateSpace
@@ -17,7 +16,7 @@ from upright.systems import StateSpace
 _HOW = "[A, B, C, D, Ts] = ssdata(sys); save('model.mat', 'A', 'B', 'C', 'D', 'Ts', '-v7')"
 
 
-def from_matlab(file: str | os.PathLike[str], name: str | None = None) -> StateSpace:
+def from_matlab(file: PathLike, name: str | None = None) -> StateSpace:
     """Linear model of a MAT file: variables or a structure with the fields A, B, C, D and Ts, as `ssdata` gives them.
 
     MATLAB stores `ss`, `idss` and `idgrey` objects in a form that only MATLAB reads. Save their matrices::

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput, nearest
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.study.text import Section
     from upright.systems import StateSpace
 
@@ -35,7 +35,7 @@ def linear_model(model: Any) -> StateSpace:
     return system if system.name else replace(system, name="a linear model")
 
 
-def read_matrices(path: str | os.PathLike[str]) -> StateSpace:
+def read_matrices(path: PathLike) -> StateSpace:
     """Model of a file in TOML: A and B, and where they are not what goes without saying C, D, dt, names and units.
 
     Raises

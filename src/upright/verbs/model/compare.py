@@ -17,9 +17,11 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import paths
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.identification.model.runs import Run
     from upright.report.fit.compare import ComparedRun, Comparison
     from upright.study.stored_fit import StoredFit
+    from upright.verbs.forms import FitLike, StudyLike
 
 LEAD = 0.4
 """Share of a run after which fits may look at it for its start state; from its half on they predict."""
@@ -76,8 +78,8 @@ def _is_fit(path: Path) -> bool:
 )
 @keeps_its_inputs
 def compare(
-    fits: Sequence[Any], log: Any = None, *, data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    fits: Sequence[FitLike] | FitLike, log: StudyLike | None = None, *, data: PathLike | None = None,
+    out: PathLike | None = None, pdf: bool = False,
 ) -> ComparisonAnswer:  # fmt: skip
     """Compare fits with each other, with a black-box (ARX) baseline, and on a run that none was fitted to.
 
@@ -217,7 +219,7 @@ def _logs(fit: StoredFit) -> set[str]:
 
 
 def _runs(
-    sources: Mapping[str, Any], fitted: Mapping[str, StoredFit], log: Any, data: str | os.PathLike[str] | None
+    sources: Mapping[str, Any], fitted: Mapping[str, StoredFit], log: Any, data: PathLike | None
 ) -> dict[str, ComparedRun]:  # fmt: skip
     """Every run as all predict it."""
     from upright.verbs.model.predict import runs_to_predict

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from upright.verbs.values import pairs, path_of, paths, si
 
 if TYPE_CHECKING:
     from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
+    from upright.files import PathLike
 
 KINDS = ("sines", "multisine", "sweep")
 
@@ -83,9 +83,9 @@ class ResponseOptions(TypedDict, total=False):
 @written_where_named
 @keeps_its_inputs
 def frequency(
-    sources: Sequence[str | os.PathLike[str]] | str | os.PathLike[str] | None = None, *, rig: str | None = None,
-    seed: int = 0, ask: str = "sines", data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False, progress: Progress = silent,
+    sources: Sequence[PathLike] | PathLike | None = None, *, rig: str | None = None,
+    seed: int = 0, ask: str = "sines", data: PathLike | None = None,
+    out: PathLike | None = None, pdf: bool = False, progress: Progress = silent,
     **of_log: Unpack[ResponseOptions],
 ) -> Answer[FrequencyRun | LoggedResponse]:  # fmt: skip
     """Measure a frequency response, or read one from logs, and fit the rig to it.

@@ -12,13 +12,14 @@ from upright.files import keeps_its_inputs
 from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.command import Flag, command
-from upright.verbs.study import folder_beside, read_study
 from upright.verbs.values import open_log, texts
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.physics import Plant
     from upright.rig import Rig
     from upright.study.load import Study
+    from upright.verbs.forms import PlantLike, StudyLike
     from upright.verbs.values import Workforce
 
 from upright.verbs.model.fit import FitAnswer
@@ -54,7 +55,7 @@ class LogOptions(TypedDict, total=False):
 def _read_first(typed: dict[str, Any]) -> dict[str, Any]:
     """What was typed, with the study read: a command takes no log, and has its folder beside the study."""
     folder = typed["out"] if typed["out"] is not None else folder_beside(typed["study"], "fit")
-    return {**typed, "study": read_study(typed["study"], folder, typed["data"]), "out": folder}
+    return {**typed, "study": _read_study(typed["study"], folder, typed["data"]), "out": folder}
 
 
 def _keys() -> str:
@@ -121,9 +122,10 @@ def _keys() -> str:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def identify(
-    study: Any, plant: Any = None, *, data: str | Path | None = None, hold_out: Sequence[str] | str | None = None,
-    method: str = "auto", out: str | Path | None = None, report: bool = True, pdf: bool = False,
-    workers: Workforce = 1, progress: Progress = silent, **of_log: Unpack[LogOptions],
+    study: StudyLike, plant: PlantLike | None = None, *, data: PathLike | None = None,
+    hold_out: Sequence[str] | str | None = None, method: str = "auto", out: PathLike | None = None,
+    report: bool = True, pdf: bool = False, workers: Workforce = 1, progress: Progress = silent,
+    **of_log: Unpack[LogOptions],
 ) -> FitAnswer:  # fmt: skip
     """Fit a rig's parameters to its logs as a study file says; write estimates and report.
 
@@ -209,7 +211,7 @@ def identify(
             write_fit(fit, requested, written[0], crossed)
     page = chapter(
         fit, title=requested.title or requested.path.stem.replace("_", " "), provenance=requested.provenance,
-        crossed=crossed, study=typed(label) + (f" --data {typed(data)}" if data is not None else ""),
+        crossed=crossed, study=typed(label) + (f" --data {typed(Path(data))}" if data is not None else ""),
         folder=typed(folder) if folder is not None else "OUT", windows=windows(requested.runs),
     )  # fmt: skip
     page = replace(page, numbers=fit_content(fit, requested, crossed))
@@ -223,7 +225,7 @@ def identify(
 
 
 def requested_study(
-    source: Any, plant: Any = None, *, verb: str, folder: Path | None = None, data: str | Path | None = None,
+    source: Any, plant: Any = None, *, verb: str, folder: Path | None = None, data: PathLike | None = None,
     **options: Any,
 ) -> Study:  # fmt: skip
     """The study that was handed in, or the one that a log and what is known of its rig make."""
@@ -239,7 +241,7 @@ def requested_study(
             raise BadInput(f"{name} belongs to a log; the study says it itself, so change it there.")
         if isinstance(source, Study):
             return source
-        return read_study(Path(source), folder or Path(), None if data is None else Path(data))
+        return _read_study(Path(source), folder or Path(), None if data is None else Path(data))
     from upright.study.draft.from_record import study_of_record
 
     known: Any = options.get("known")
@@ -277,3 +279,32 @@ def _what_moves(plant: Any, verb: str) -> type[Plant] | Rig | None:
 
 def _is_study(path: Path) -> bool:
     return path.suffix.lower() in (".toml", "")
+
+
+def _read_study(study: Path, folder: Path, data: Path | None) -> Study:
+    """A study, once study and folder of the results are what they should be."""
+    from upright.readers.source import neighbour
+    from upright.report.symbols import typed
+    from upright.study.load import load_study
+
+    if not study.exists():
+        raise BadInput(
+            f"There is no study '{study}';{neighbour(study)} "
+            f"`upright init LOG -o {typed(study.name)}` writes one from a log"
+        )
+    if folder.exists() and not folder.is_dir():
+        raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")
+    return load_study(study, data=data)
+
+
+def folder_beside(study: Path, what: str) -> Path:
+    """Folder of results beside a study and called after it, ``crane-fit``.
+
+    Raises
+    ------
+    BadInput
+        When the study is a folder.
+    """
+    if study.is_dir():
+        raise BadInput(f"'{study}' is a folder, and a study is a TOML file; name the file inside it.")
+    return study.with_name(f"{study.stem}-{what}")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs
@@ -13,13 +12,14 @@ from upright.progress import Progress, silent
 from upright.renamed import CLUSTER, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
-from upright.verbs.model.identify import LogOptions, requested_study
+from upright.verbs.model.identify import LogOptions, folder_beside, requested_study
 from upright.verbs.options import known_options
 from upright.verbs.pages import pdf_has_folder, write_page
-from upright.verbs.study import folder_beside
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.identification.ladder.growth import Ladder
+    from upright.verbs.forms import PlantLike, StudyLike
     from upright.verbs.values import Workforce
 
 
@@ -54,8 +54,8 @@ if TYPE_CHECKING:
 @renamed(CLUSTER)
 @keeps_its_inputs
 def ladder(
-    study: Any, plant: Any = None, *, out: str | os.PathLike[str] | None = None,
-    data: str | os.PathLike[str] | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
+    study: StudyLike, plant: PlantLike | None = None, *, out: PathLike | None = None,
+    data: PathLike | None = None, report: bool = True, pdf: bool = False, workers: Workforce = 1,
     progress: Progress = silent, **of_log: Unpack[LogOptions],
 ) -> Answer[Ladder]:  # fmt: skip
     """Add terms to a model only while it predicts unseen runs better.

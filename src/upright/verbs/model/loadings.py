@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from upright.verbs.pages import folder_if_given, write_page
 from upright.verbs.values import open_log, paths, si, texts
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.identification.loadings import Loadings, Plan
     from upright.verbs.values import Log
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 def loadings(
     logs: Sequence[Log] | Log | None = None, *, added: Sequence[str] | str | None = None, signal: str | None = None,
     command: str | None = None,    tolerance: float | str = "0 %", free: bool = False, twin: str | None = None,
-    seed: int = 0, out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    seed: int = 0, out: PathLike | None = None, pdf: bool = False,
 ) -> Answer[Loadings]:  # fmt: skip
     """Find stiffness and bare inertia from step responses with known added masses.
 
@@ -113,7 +113,7 @@ def plan_inertias(
     *, rig: str = "rectilinear", bare: float | str | None = None, error: float | str = "0.2 %",
     tolerance: float | str = "0.2 %", runs: int = 10, levels: int = 3,
     radius: Sequence[float | str] | float | str | None = None, target: float | str | None = None,
-    out: str | os.PathLike[str] | None = None,
+    out: PathLike | None = None,
 ) -> Answer[dict[int, tuple[Plan, Plan]]]:  # fmt: skip
     """Plan which masses to add, and how often, for the most accurate stiffness.
 

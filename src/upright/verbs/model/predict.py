@@ -16,9 +16,11 @@ from upright.verbs.pages import folder, pdf_has_folder, write_page
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
+    from upright.files import PathLike
     from upright.identification.inference.scoring import RunScore
     from upright.study.load import Study
     from upright.study.stored_fit import StoredFit
+    from upright.verbs.forms import FitLike, StudyLike
 
 
 @command(
@@ -43,8 +45,8 @@ if TYPE_CHECKING:
 )
 @keeps_its_inputs
 def predict(
-    model: Any, study: Any, *, data: str | os.PathLike[str] | None = None,
-    out: str | os.PathLike[str] | None = None, pdf: bool = False,
+    model: FitLike, study: StudyLike, *, data: PathLike | None = None,
+    out: PathLike | None = None, pdf: bool = False,
 ) -> Answer[dict[str, RunScore]]:  # fmt: skip
     """Predict other runs with a fitted model, and score the prediction.
 
@@ -148,7 +150,7 @@ def _fitted_note(fitted_runs: Mapping[str, str], runs: int) -> str:
     return f"{what} {which}. "
 
 
-def runs_to_predict(fitted: StoredFit, source: Any, data: str | os.PathLike[str] | None) -> tuple[Study, str]:
+def runs_to_predict(fitted: StoredFit, source: Any, data: PathLike | None) -> tuple[Study, str]:
     """Study of the runs to score, and what it is called."""
     from upright.study.draft.from_record import study_of_record
     from upright.study.load import Study, load_study
