@@ -10,6 +10,7 @@ import pytest
 
 from tests.experiments.quick.test_quick import described
 from tests.experiments.swing_up_2b.closed_form import LAW, RIG, climbed
+from upright.basis import DESCRIBED
 from upright.control.exploration import CALMS, COASTS, ENDS, KICKS, PUMPS, RISES, WAITS
 from upright.control.wiring import WiringCheck
 from upright.experiments.quick.chapter import chapter
@@ -73,6 +74,8 @@ def test_a_pendulum_that_stands_is_said_to_after_how_long(done):
     assert told["swing_up"] == {"upright_after": 2.0, "peak_command": 8.0, "travel": pytest.approx(0.6, rel=1e-3),
                                 "ended": None}  # fmt: skip
     assert told["K"].tolist() == LAW.K.tolist()
+    assert told["rule"]["kind"] == "rule"
+    assert told["basis"] == RIG.basis.plain()
     assert told["fit"]["parameters"]["J_d"]["value"] == 0.0125
 
 
@@ -139,6 +142,9 @@ def test_where_the_wiring_is_wrong_no_loop_is_closed_and_each_remedy_is_a_step(d
     unwired = replace(done, refused="too few", ascent=None, share=None)
     assert [(k.what, k.value) for k in chapter(unwired).findings] == [("no loop", "too few")]
     assert chapter(unwired).detail == ""
+    assert page.numbers["basis"] == DESCRIBED.plain()  # nothing was identified
+    assert page.numbers["rule"] is None
+    assert chapter(replace(unwired, law=None)).numbers["rule"] is None
 
 
 def test_first_motions_begin_at_zero_and_every_phase_is_marked_where_it_begins(done):
