@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from upright.errors import BadInput
 from upright.files import keeps_its_inputs, replace_file
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
@@ -20,6 +21,7 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 @command(
     name="firmware build",
     metavars=_METAVARS,
+    defaults={"out": "upright-firmware"},
     more="""
     upright firmware build --drive pair
     upright firmware build --drive pair --rig RIG.toml     ceilings that no host can widen: the rig's own limits
@@ -28,7 +30,7 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 @keeps_its_inputs
 def firmware_build(
     *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
-    out: PathLike = "upright-firmware",
+    out: PathLike | None = None,
 ) -> Answer[Image]:  # fmt: skip
     """Make the image that goes onto a board.
 
@@ -44,7 +46,7 @@ def firmware_build(
     rig : path, optional
         RIG.toml whose [limits] are compiled in as ceilings.
     out : path
-        Folder for the image.
+        Folder for the image; a command's is upright-firmware when omitted.
 
     Returns
     -------
@@ -59,6 +61,8 @@ def firmware_build(
     from upright.report.page import Chapter, Facts, Part
     from upright.rigs.firmware import board_of, build_image
 
+    if out is None:
+        raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
     image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
     whence = "As it comes with this package." if image.ready else "Built here."
@@ -77,6 +81,7 @@ def firmware_build(
 @command(
     name="firmware flash",
     metavars=_METAVARS,
+    defaults={"out": "upright-firmware"},
     more="""
     With the motor's supply off.
 
@@ -85,7 +90,7 @@ def firmware_build(
 )
 def firmware_flash(
     *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None, port: str | None = None,
-    out: PathLike = "upright-firmware", hand: Callable[[str], bool] = lambda _: True,
+    out: PathLike | None = None, hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
     """Build the image, write it to a board once you agree, and verify it.
 
@@ -100,7 +105,7 @@ def firmware_flash(
     port : str, optional
         Where the board is; found where it is left out.
     out : path
-        Folder for the image.
+        Folder for the image; a command's is upright-firmware when omitted.
     hand : callable, optional
         Asked before anything is written.
 
@@ -119,6 +124,8 @@ def firmware_flash(
     from upright.report.page import Chapter
     from upright.rigs.firmware import board_of, build_image, flash
 
+    if out is None:
+        raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
     image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
     flashed = flash(made, image.path, port or "", hand=hand)
@@ -178,7 +185,6 @@ def firmware_pins(
 
 def _ceilings(path: Path) -> dict[str, int]:
     """A rig's own limits as its board can be compiled for them."""
-    from upright.errors import BadInput
     from upright.rigs.driver import FULL_SCALE
     from upright.rigs.firmware import ceilings_of
     from upright.rigs.rigfile import read_rig_file
