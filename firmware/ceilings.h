@@ -29,4 +29,8 @@
 #ifndef CEILING_PATIENCE
 #define CEILING_PATIENCE 1000 /* that an armed rig at zero command waits for its host */
 #endif
+#ifndef CEILING_BRAKE
+#define CEILING_BRAKE 0 /* that a stop leaves the power stage on at zero command, 1000 at most; see drive.h */
+#endif
+_Static_assert(CEILING_BRAKE >= 0 && CEILING_BRAKE <= 1000, "a brake lasts 1 s at most");
 #endif

@@ -8,6 +8,14 @@
 #define DRIVE DRIVE_ANALOG
 #endif
 
+/* A BTS7960 that is enabled with both inputs low shorts the motor, which brakes itself, and a loose wire is low as well.
+ * Where one input low does not short it (L298N, VNH5019, DRV8871), or an amplifier holds the torque at zero, there is
+ * nothing to brake by. */
+#include "ceilings.h"
+#if CEILING_BRAKE && DRIVE != DRIVE_PAIR
+#error "CEILING_BRAKE is for two PWM lines, and a bridge that shorts the motor while both are low: a BTS7960."
+#endif
+
 #if DRIVE == DRIVE_ANALOG
 #define DRIVE_NAME "analog"
 #elif DRIVE == DRIVE_PAIR

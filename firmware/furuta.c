@@ -25,6 +25,7 @@ static const struct {
     {"gain", offsetof(furuta_t, gain), true},
     {"step", offsetof(furuta_t, step), true},
     {"dead", offsetof(furuta_t, dead), false},
+    {"emf", offsetof(furuta_t, emf), false},
     {"counts_psi", offsetof(furuta_t, counts[0]), true},
     {"counts_theta", offsetof(furuta_t, counts[1]), true},
     {"psi", offsetof(furuta_t, x[0]), false},

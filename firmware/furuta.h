@@ -10,6 +10,7 @@ typedef struct {
     double k_psi;     /* anchors the arm to ground; 0 when nobody says */
     double gain;      /* torque per unit of command */
     double step;      /* command of one step of the converter */
+    double emf;       /* damping by the motor's own voltage while its bridge is on [N m s/rad]; 0 when nobody says */
     double dead;      /* command that the drive swallows to either side; 0 when nobody says */
     double counts[2]; /* per rad */
     double x[4];      /* psi, psi', theta, theta' */

@@ -37,7 +37,8 @@ void mishaps_move(mishaps_t *now, furuta_t *rig, bool on, double command, double
     if (!rig->running) return;
     hand_moves(&now->hand, rig, on, command != 0, dt);
     double size = fabs(rig->step * command) - rig->dead; /* beyond what the drive swallows */
-    furuta_move(rig, on && size > 0 ? now->motor * rig->gain * copysign(size, command) : 0, dt);
+    double pushes = on && size > 0 ? now->motor * rig->gain * copysign(size, command) : 0;
+    furuta_move(rig, on ? pushes - rig->emf * rig->x[1] : 0, dt);
 }
 
 bool mishaps_line(mishaps_t *now, furuta_t *rig, const char *line) {

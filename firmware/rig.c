@@ -61,6 +61,7 @@ static float reference;
 static uint32_t silence, saturated;                    /* ticks */
 static int16_t pulse;
 static uint16_t pulse_left;
+static uint16_t braking;                               /* ticks that a stopped rig's power stage stays on */
 static uint8_t until_law;                              /* ticks to the law's next sample */
 static uint16_t lost;                                  /* ticks that never came */
 static bool overran;                                   /* a tick came due during this one */
@@ -89,7 +90,8 @@ static bool jumps(int32_t step, uint32_t speed) {
 /* Zero output before anything else. */
 static void power_off(enum mode next) {
     port_command(0);
-    port_enable(false);
+    if (powered()) braking = CEILING_BRAKE;
+    if (!braking) port_enable(false);
     mode = next;
     output = now.applied = 0;
     pulse_left = 0;
@@ -197,7 +199,10 @@ void rig_tick(uint32_t tick, uint16_t late) {
         if (running()) trip(F_OVERRUN);
     }
     if (!running() && !pulsing()) port_command(0); /* to a converter that lost its number, too */
-    if (!powered()) port_enable(false);
+    if (!powered()) {
+        braking -= elapsed < braking ? (uint16_t)elapsed : braking;
+        if (!braking) port_enable(false);
+    }
     now.mode = mode;
     now.faults = faults;
     if ((int32_t)(tick - answer_at) < 0) return;
@@ -317,6 +322,7 @@ static uint8_t arm(void) {
         trip(F_START);
     } else {
         silence = saturated = 0;
+        braking = 0;
         asked = output = 0;
         reference = 0;
         memset(travelled_alone, 0, sizeof travelled_alone);
@@ -545,6 +551,8 @@ void rig_receive(uint8_t byte) {
 }
 
 void rig_reset(void) {
+    mode = FAULT; /* nothing to brake */
+    braking = 0;
     power_off(FAULT);
     faults = F_RESET;
     memset(&now, 0, sizeof now);

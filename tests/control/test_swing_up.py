@@ -126,6 +126,32 @@ def test_the_catch_is_the_ellipsoid_of_twice_the_limit(make):
     assert 0 < law.size <= 0.8 * law.sure
 
 
+def test_where_all_of_the_sure_ellipsoid_rests_the_catch_is_four_fifths_of_it():
+    """A feedback that knows the speeds, held from sample to sample and cut at the limit, typed by hand on eq. (3)."""
+    rig = frictionless("linear")
+    law, p = designed("linear"), rig.plant
+    rng, J_A = np.random.default_rng(4), p.J_p + p.m_p * p.l_cg**2
+    rose = rng.normal(size=(4, 20_000))
+    x = np.linalg.inv(np.linalg.cholesky(law.P)).T @ (rose / np.linalg.norm(rose, axis=0)) * math.sqrt(law.sure)
+    caught = (np.abs(x[2]) <= 0.5) & (np.abs(x[1]) <= law.fast) & (np.abs(x[0]) <= law.travel / 2)
+    x = x[:, caught][:, :100]
+
+    def rates(x, force):
+        s, c = np.sin(math.pi + x[2]), np.cos(math.pi + x[2])
+        push, turn = force + p.m_p * p.l_cg * s * x[3] ** 2, -p.m_p * p.g * p.l_cg * s
+        D = (p.m_c + p.m_p) * J_A - (p.m_p * p.l_cg * c) ** 2
+        a, alpha = J_A * push - p.m_p * p.l_cg * c * turn, (p.m_c + p.m_p) * turn - p.m_p * p.l_cg * c * push
+        return np.array([x[1], a / D, x[3], alpha / D])
+
+    for _ in range(round(2.5 / rig.period)):
+        force, h = rig.gain * np.clip(-law.K @ x, -rig.limit, rig.limit), rig.period
+        middle = x + h / 2 * rates(x, force)
+        x = x + h * rates(middle, force)  # the midpoint rule: (omega h)^2 is 1e-4
+        assert np.abs(x[0]).max() < law.travel
+    assert np.abs(x[2]).max() < 0.1
+    assert law.size == pytest.approx(0.8 * law.sure)
+
+
 @pytest.mark.parametrize("make", MAKES)
 def test_a_pump_of_bounded_acceleration_moves_its_body_no_faster_than_that_allows(make):
     """Spring and damper pushed by any signal within ``reach``: its size times the integral of the absolute impulse

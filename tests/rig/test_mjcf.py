@@ -186,8 +186,8 @@ def test_one_body_is_a_cart_a_disk_or_a_pendulum(bodies, kind, tmp_path):
 
 
 def test_the_drive_moves_the_rig_as_mujocos_actuator_does(tmp_path):
-    """Gear, loss with speed, and both limits; fourth-order steps of 1 ms there and 0.25 ms here."""
-    drive = '<general joint="rail" gear="4" gainprm="0.5" biastype="affine" biasprm="0 0 -0.05" ctrllimited="true" '
+    """Gear, a push of its own, loss with speed, and both limits; fourth-order steps of 1 ms there and 0.25 ms here."""
+    drive = '<general joint="rail" gear="4" gainprm="0.5" biastype="affine" biasprm="0.1 0 -0.05" ctrllimited="true" '
     drive += 'ctrlrange="-3 3" forcelimited="true" forcerange="-1.2 1.2"/>'
     flag = 'integrator="RK4" timestep="1e-3"'
     path = written(tmp_path / "rig.xml", cart(), actuator=drive, option=flag)

@@ -90,6 +90,19 @@ def test_a_plant_lists_what_it_needs_and_what_is_not_zero():
     assert said.verdict == "Moves in theta [rad]; driven by T [N m]; equilibria: hanging, inverted."
 
 
+@pytest.mark.parametrize(
+    ("plant", "unit", "said"),
+    [
+        (up.Pendulum(m_p=0.25, l_cg=0.125, J_p=0.0), "V", "Pendulum behind a drive of 0.6500 N m/V."),
+        (up.Pendulum(m_p=0.25, l_cg=0.125, J_p=0.0), "1", "Pendulum behind a drive of 0.6500 N m."),
+        (up.CartPendulum(m_c=0.6, m_p=0.14, l_cg=0.19, J_p=6e-4), "A", "CartPendulum behind a drive of 0.6500 N/A."),
+    ],
+)
+def test_a_drive_gives_the_plant_s_force_for_the_unit_of_its_command(plant, unit, said):
+    rig = up.Rig.known(plant, gain=0.65, unit=unit)
+    assert summary(rig).verdict.replace("\N{NO-BREAK SPACE}", " ") == said
+
+
 CONTINUOUS = up.StateSpace([[0.0, 1.0], [-25.0, -6.0]], [0.0, 2.0], states=("x", "v"), inputs=("F",), point={"x": 0.5})
 
 

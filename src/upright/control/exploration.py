@@ -27,8 +27,6 @@ SWING = math.radians(70)
 """Shown angle to which the pendulum is swung [rad]; true are 150 degrees where half is shown, and still no turn."""
 SECONDS = 18.0
 """All of it [s]."""
-RAMP, PAUSE, KICK, PATIENCE, PUMP, BRAKE, COAST = 4.0, 0.5, 0.12, 2.5, 7.0, 0.3, 3.0
-"""How long each may take [s]: a ramp to the largest command, the pause after it, a kick, all kicks, ..."""
 FILTER, SLOW = 0.006, 0.05
 """Of the differences that give speeds, and of those that tell where something goes by itself [s]."""
 WAITS, RISES, RESTS, FALLS, STOPS, KICKS, PUMPS, BRAKES, COASTS, CALMS, ENDS = range(11)

@@ -2,9 +2,9 @@
 
 The driven body stands still where its command is within friction, for as long as it likes; beyond `HELD_BY` times the
 friction that the model knows of, it moves, and disturbs the pendulum on it. That pendulum stands still, to a count,
-only while what carries it is accelerated against what its lean makes of it: ``theta'' = psi''/rho + a_33 theta``, where
-hinges hold little and the lean is known to `OUT_OF_TRUE`. What else holds either is a hand; and where nothing moves at
-all, nobody can tell.
+only while what carries it is accelerated against what its lean makes of it: ``theta'' = psi''/rho + g/l theta``, with
+g/l that of a pendulum on a wall, where hinges hold little and the lean is known to `OUT_OF_TRUE`. What else holds
+either is a hand; and where nothing moves at all, nobody can tell.
 """
 
 from __future__ import annotations
@@ -71,9 +71,10 @@ class StillPendulum:
         B = linear.B[1::2, 0]
         self._body = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
         self.which = 1 - self._body
-        self._gravity = float(linear.A[2 * self.which + 1, 2 * self.which])
-        self.name = model.plant.coordinates[self.which].name
         self._rho, self._period = float(B[self._body] / B[self.which]), model.period
+        pull = linear.A[1::2, 2 * self.which]  # of a lean; a body that is free gives way to it
+        self._gravity = float(pull[self.which] - pull[self._body] / self._rho)
+        self.name = model.plant.coordinates[self.which].name
         self._least = max(SWUNG, LEAST_SWUNG / model.per_unit[self.which])
         self._shown, self._behind = math.nan, math.nan
         self._from, self._speed, self._for, self._seconds = 0.0, 0.0, 0.0, 0.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
-from upright.identification.checks.outliers import refit_without_outliers
+from upright.identification.checks.outliers import ProvisionalFit, refit_without_outliers
 from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
 from upright.identification.inference.bands import calibrated
@@ -104,20 +104,35 @@ def identify(
     BadInput
         When no run may be fitted, nothing is to be estimated, or a name does not exist.
     """
-    return _identify(rig, runs, method, progress, watch=watch, near=near)
-
-
-def _identify(
-    rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, *, watch: bool, near: Fit | None,
-    conventions: Callable[[], Sequence[str]] | None = None, moments: Moments | None = None,
-) -> Fit:  # fmt: skip
-    """As `identify`; a fit without outliers knows `conventions` and `moments` of all samples."""
-    began = time.perf_counter()
     rig = with_noise(rig, runs)
-    moments = moments or Moments(rig)
+    moments = Moments(rig)
+    fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
+    conventions = cache(lambda: wrong_conventions(rig, fitted))
+
+    def located(retained: Sequence[Run], near: Fit | None) -> ProvisionalFit:
+        looking = watch and retained is runs
+        return _provisional(rig, retained, method, progress, moments, conventions, watch=looking, near=near)
+
+    first = located(runs, near)
+    if not watch or first.fit.interrupted or first.fit.failed:
+        return first.whole()
+    try:
+        fit = refit_without_outliers(first, rig, runs, located)
+        explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
+        return fit if explained or conventions() else with_proposal(fit, fitted)
+    except KeyboardInterrupt:
+        return first.interrupted()
+
+
+def _provisional(
+    rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, moments: Moments,
+    conventions: Callable[[], Sequence[str]], *, watch: bool, near: Fit | None,
+) -> ProvisionalFit:  # fmt: skip
+    """Where the search ends; `moments` and `conventions` are those of all samples."""
+    began = time.perf_counter()
     fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
-    log = SearchLog(progress=progress, conventions=conventions or cache(lambda: wrong_conventions(rig, fitted)))
+    log = SearchLog(progress=progress, conventions=conventions)
     log.warnings += unasked_trips(rig, fitted, moments)
     try:
         problem, optimum = find_optimum(rig, fitted, method, log, near)
@@ -125,31 +140,31 @@ def _identify(
         problem, x = _best_so_far(rig, fitted, log)
         optimum = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
 
-    def conclude(end: Descent) -> Fit:
-        fit = _conclude(rig, runs, problem, end, log, watch=watch)
+    def conclude(end: Descent, *, values: bool = False) -> Fit:
+        fit = _conclude(rig, runs, problem, end, log, watch=watch, values=values)
         return replace(fit, method=method, seconds=time.perf_counter() - began)
 
+    def whole() -> Fit:
+        end = optimum
+        try:
+            fit = conclude(end)
+            for _ in range(LOWER):
+                if log.lower is None or log.lower[0] is not problem or fit.interrupted:
+                    break
+                end = descend(problem.normal, log.lower[2], problem.lower, problem.upper, tolerance=1e-6)
+                log.note("lower, met by an interval", end.normal.cost, problem)
+                log.lower = None
+                fit = conclude(other_valleys(problem, end, log))
+        except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
+            return conclude(replace(end, interrupted=True))
+        return fit
+
     try:
-        fit = conclude(optimum)
-        for _ in range(LOWER):
-            if log.lower is None or log.lower[0] is not problem or fit.interrupted:
-                break
-            optimum = descend(problem.normal, log.lower[2], problem.lower, problem.upper, tolerance=1e-6)
-            log.note("lower, met by an interval", optimum.normal.cost, problem)
-            log.lower = None
-            fit = conclude(other_valleys(problem, optimum, log))
-        if not watch or fit.interrupted or fit.failed:
-            return fit
-        fit = refit_without_outliers(
-            fit, rig, runs,
-            lambda left: _identify(
-                rig, left, method, progress, watch=False, near=fit, conventions=log.conventions, moments=moments
-            ),
-        )  # fmt: skip
-        explained = least_explained(fit.runs) >= GOOD  # conventions are dear to try, and a good fit has the right ones
-        return fit if explained or log.conventions() else with_proposal(fit, fitted)
-    except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
-        return conclude(replace(optimum, interrupted=True))
+        fit = conclude(optimum, values=True)
+    except KeyboardInterrupt:
+        optimum = replace(optimum, interrupted=True)
+        fit = conclude(optimum, values=True)
+    return ProvisionalFit(fit=fit, whole=whole, interrupted=lambda: conclude(replace(optimum, interrupted=True)))
 
 
 def find_optimum(
@@ -235,16 +250,19 @@ def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
 
 
 def _conclude(
-    requested: GreyBox, runs: Sequence[Run], problem: Problem, end: Descent, log: SearchLog, *, watch: bool
+    requested: GreyBox, runs: Sequence[Run], problem: Problem, end: Descent, log: SearchLog, *, watch: bool,
+    values: bool,
 ) -> Fit:  # fmt: skip
-    """Everything known about an optimum; of an interrupted search only what takes no time, so no predictions.
+    """Everything known about an optimum; of an interrupted search, or for `values` alone, only what takes no time.
+
+    That is without predictions.
 
     Where the motion runs away nothing is known of how sure the numbers are, and nothing is predicted.
     """
     best = assess(problem, end.x)
     identifiable = identifiability(best)
     warnings = list(log.warnings)
-    brief = end.interrupted or bool(best.lost)
+    brief = values or end.interrupted or bool(best.lost)
     little = explains_little(problem, end)
     if little and not brief:
         warnings.append(

@@ -40,7 +40,7 @@ def as_values(law: Law | Rule) -> dict[str, Any]:
         value = getattr(law, field.name)
         if field.name == "function":
             out["text"] = law.compiled_in.text  # type: ignore[union-attr]
-        elif field.default is MISSING or not _same(value, field.default):
+        elif field.default is MISSING or isinstance(value, np.ndarray) or value != field.default:
             out[field.name] = value if isinstance(value, str) else np.asarray(value).tolist()
     return out
 
@@ -69,12 +69,6 @@ def of_values(values: Mapping[str, Any]) -> Law | Rule:
             raise
         raise BadInput(f"the values are no law's ({error}); write them with upright.laws.as_values.") from None
     raise BadInput(f"a law's kind is 'linear' or 'rule', got {kind!r}; write it with upright.laws.as_values.")
-
-
-def _same(value: Any, default: Any) -> bool:
-    if value is None or default is None or isinstance(default, str | tuple):
-        return type(value) is type(default) and value == default
-    return np.ndim(value) == 0 and value == default
 
 
 def _function(text: str) -> Function:

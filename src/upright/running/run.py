@@ -175,7 +175,7 @@ class RigRun:
     @property
     def sound(self) -> bool:
         """Whether it ran to its end, in time, with a whole log."""
-        return not self.end.stopped and self.complete and self.end.late <= TOLERATED * max(self.end.ticks, 1)
+        return not self.end.stopped and self.complete and self.end.late <= TOLERATED * self.end.ticks
 
     @property
     def verdict(self) -> str:

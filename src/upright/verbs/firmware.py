@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from upright.files import PathLike
     from upright.rigs.firmware import Flashed, Image, Pin
 
-_METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"}
+_METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT", "brake": "TIME"}
 
 
 @command(
@@ -25,12 +25,13 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
     more="""
     upright firmware build --drive pair
     upright firmware build --drive pair --rig RIG.toml     ceilings that no host can widen: the rig's own limits
+    upright firmware build --drive pair --brake 0.3s       a stop shorts the motor for so long (BTS7960)
     """,
 )
 @keeps_its_inputs
 def firmware_build(
     *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
-    out: PathLike | None = None,
+    brake: float | str | None = None, out: PathLike | None = None,
 ) -> Answer[Image]:  # fmt: skip
     """Make the image that goes onto a board.
 
@@ -45,6 +46,9 @@ def firmware_build(
         (BTS7960, DRV8871); ``"sign"``: one PWM line and the way (VNH5019, L298N).
     rig : path, optional
         RIG.toml whose [limits] are compiled in as ceilings.
+    brake : float or str, optional
+        For how long a stop leaves the bridge on with both lines low, so that it shorts the motor, ``"0.3 s"``; 1 s at
+        most. For a BTS7960 (``"pair"``); without it the rig coasts.
     out : path
         Folder for the image; a command's is upright-firmware when omitted.
 
@@ -64,7 +68,7 @@ def firmware_build(
     if out is None:
         raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
-    image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
+    image = build_image(made, drive, Path(out), _ceilings(rig, brake, drive))
     whence = "As it comes with this package." if image.ready else "Built here."
     held = tuple((name.lower().replace("_", " "), str(value)) for name, value in image.ceilings.items())
     return Answer(
@@ -89,8 +93,9 @@ def firmware_build(
     """,
 )
 def firmware_flash(
-    *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None, port: str | None = None,
-    out: PathLike | None = None, hand: Callable[[str], bool] = lambda _: True,
+    *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
+    brake: float | str | None = None, port: str | None = None, out: PathLike | None = None,
+    hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
     """Build the image, write it to a board once you agree, and verify it.
 
@@ -102,6 +107,8 @@ def firmware_flash(
         As of `firmware_build`.
     rig : path, optional
         RIG.toml whose [limits] are compiled in as ceilings.
+    brake : float or str, optional
+        As of `firmware_build`.
     port : str, optional
         Where the board is; found where it is left out.
     out : path
@@ -127,7 +134,7 @@ def firmware_flash(
     if out is None:
         raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
-    image = build_image(made, drive, Path(out), None if rig is None else _ceilings(Path(rig)))
+    image = build_image(made, drive, Path(out), _ceilings(rig, brake, drive))
     flashed = flash(made, image.path, port or "", hand=hand)
     return Answer(
         flashed,
@@ -183,8 +190,23 @@ def firmware_pins(
     )  # fmt: skip
 
 
-def _ceilings(path: Path) -> dict[str, int]:
-    """A rig's own limits as its board can be compiled for them."""
+def _ceilings(rig: PathLike | None, brake: float | str | None, drive: str) -> dict[str, int]:
+    """A rig's own limits, and for how long it brakes [ticks], as its board can be compiled for them."""
+    from upright.rigs.firmware.boards import PAIR
+    from upright.verbs.values import si_if_given
+
+    ticks = round(1e3 * (si_if_given(brake, "s") or 0.0))
+    if not 0 <= ticks <= 1000:
+        raise BadInput(f"a stop brakes for 1 s at most, got {ticks / 1e3:g} s.")
+    if ticks and drive != PAIR:
+        raise BadInput(
+            f"a stop brakes by two PWM lines that are both low, on a bridge that shorts the motor then (BTS7960): "
+            f"drive '{PAIR}', got '{drive}'; on any other drive the board can only switch off."
+        )
+    return {**({} if rig is None else _limits(Path(rig))), **({"BRAKE": ticks} if ticks else {})}
+
+
+def _limits(path: Path) -> dict[str, int]:
     from upright.rigs.driver import FULL_SCALE
     from upright.rigs.firmware import ceilings_of
     from upright.rigs.rigfile import read_rig_file

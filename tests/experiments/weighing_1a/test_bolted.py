@@ -141,6 +141,8 @@ def test_a_person_is_asked_for_every_loading_by_the_owners_words(tmp_path):
     rig = replace(made(tmp_path), person=person)
     with pytest.raises(RigStopped, match=r"requested and not done: .*0 kg in all"):
         step_stand(rig, tmp_path / "1a", lambda _step, _share: None)
+    # four commands, each for ten periods of the guessed 0.6 kg with 1 kg on it on 300 N/m
+    assert f"steps follow for {4 * 10 * 2 * np.pi * np.sqrt((0.6 + 1.0) / 300):.0f} s" in asked[0]
 
 
 @pytest.mark.parametrize(("said", "there"), [("", {"guess": "0.001768 s", "min": 0}), ("lag", "0.001768 s")])

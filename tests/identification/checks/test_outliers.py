@@ -18,6 +18,7 @@ from upright.identification.checks.outliers import (
     TOUCHED,
     UNEXPLAINED,
     Outlier,
+    ProvisionalFit,
     Stretches,
     _spiky,
     _strange,
@@ -200,6 +201,11 @@ def test_a_fast_motion_is_no_spike():
     assert spikes(x).tolist() == [100]
 
 
+def ended(fit):
+    """A search of which everything is known already."""
+    return ProvisionalFit(fit=fit, whole=lambda: fit, interrupted=lambda: fit)
+
+
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_reasons_are_those_of_the_last_fit_that_was_finished(interrupted):
     """A fit that was broken off is no model to judge by: what the first one found strange stays so."""
@@ -214,17 +220,37 @@ def test_reasons_are_those_of_the_last_fit_that_was_finished(interrupted):
     last = broken if interrupted else second
     calls = []
 
-    def again(kept):
+    def again(kept, near):
+        assert near is (last if calls else first)
         calls.append(kept)
-        return last
+        return ended(last)
 
-    fit = refit_without_outliers(first, question, runs, again)
+    fit = refit_without_outliers(ended(first), question, runs, again)
     by_first, by_last = ([o.sentence for o in outliers(f, question, runs)] for f in (first, last))
     assert by_first != by_last
     told = [w.removeprefix("Outlier: ") for w in fit.warnings if w.startswith("Outlier: ")]
     assert told == (by_first if interrupted else by_last)
     assert len(calls) == 1 or not interrupted
     assert fit.interrupted is interrupted
+
+
+def test_a_fit_without_outliers_is_that_of_the_retained_runs_with_intervals_and_predictions():
+    """As if the stretch had been cut out by hand: nothing is left at what the quick look at outliers needed."""
+    question, runs = rig(Pendulum, PENDULUM, GUESSES), swings(3)
+    runs[2] = noisy(pushed(runs[2], 5.03, 1.5), 1e-3, 99)
+    runs.append(replace(swings(4, 1)[0], label="held out", role="predict"))
+    fit = identify(question, runs)
+    retained = without_outliers(runs, outliers(identify(question, runs, watch=False), question, runs))
+    by_hand = identify(question, retained, watch=False)
+    assert "outliers" in fit.verdict
+    assert fit.trusted is by_hand.trusted
+    assert re.sub(r"[\d.]+", "", fit.verdict).startswith(re.sub(r"[\d.]+", "", by_hand.verdict))
+    assert fit.runs["held out"].fit_percent.keys() == by_hand.runs["held out"].fit_percent.keys()
+    for name, e in by_hand.estimates.items():
+        # both searches stop where a step would gain a millionth of the cost, a thousandth of a standard error
+        assert fit.estimates[name].value == pytest.approx(e.value, abs=0.02 * e.stderr)
+        assert fit.estimates[name].interval == pytest.approx(e.interval, abs=0.02 * e.stderr)
+        assert fit.estimates[name].status == e.status
 
 
 N = 24

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.identification.problem.normal_equations import Normal, mixed, products, pseudo_inverse, squares
+from upright.identification.problem.normal_equations import Normal, products, pseudo_inverse, squares
 
 CHANCE = np.random.default_rng(8)
 
@@ -25,15 +25,15 @@ def expected(simulated: list[np.ndarray], target: np.ndarray) -> np.ndarray:
     return B.T @ B
 
 
-@pytest.mark.parametrize("samples", [5, 1024, 1025, 2500])
+@pytest.mark.parametrize("samples", [5, 512, 513, 1300])
 @pytest.mark.parametrize("scaled", [True, False])
 def test_squares_are_those_of_errors_and_differences_whatever_the_blocks(samples: int, scaled: bool) -> None:
     z, y, offset, scale = lanes(samples)
     weights = np.array([2.0, 0.5])
     shown = [w * ((s if scaled else 1.0) * a + o) for w, s, a, o in zip(weights, scale, z, offset, strict=True)]
-    found = squares(z, y, offset, weights, scale if scaled else None)
+    found = squares(z, y, offset, np.diag(weights), scale if scaled else None)
     assert np.allclose(found, expected(shown, y * weights))
-    held = squares(z, y, offset, np.array([0.0, 0.5]), scale if scaled else None)
+    held = squares(z, y, offset, np.diag([0.0, 0.5]), scale if scaled else None)
     assert np.allclose(held, expected(shown[1:], 0.5 * y[:, 1:]))
 
 
@@ -43,15 +43,15 @@ def test_combinations_of_outputs_are_squared_as_such(scaled: bool) -> None:
     W = np.array([[1.0, -1.0], [0.3, 2.0]])
     shown = [(s if scaled else 1.0) * a + o for s, a, o in zip(scale, z, offset, strict=True)]
     together = [W[k, 0] * shown[0] + W[k, 1] * shown[1] for k in range(2)]
-    found = squares(*mixed(z, y, offset, scale if scaled else None, W))
+    found = squares(z, y, offset, W, scale if scaled else None)
     assert np.allclose(found, expected(together, y @ W.T))
 
 
-def test_a_lane_that_ran_away_makes_every_square_infinite() -> None:
+def test_a_lane_that_ran_away_makes_every_square_infinite_unless_its_output_has_no_weight() -> None:
     z, y, offset, _ = lanes(20)
     z[1][7, 2] = 1e200
-    assert np.all(np.isinf(squares(z, y, offset, np.ones(2))))
-    assert np.all(np.isfinite(squares(z, y, offset, np.array([1.0, 0.0]))))
+    assert np.all(np.isinf(squares(z, y, offset, np.eye(2))))
+    assert np.all(np.isfinite(squares(z, y, offset, np.diag([1.0, 0.0]))))
 
 
 @pytest.mark.parametrize("rows", [1, 63, 64, 65, 4000])

@@ -117,6 +117,18 @@ def test_a_draft_has_the_same_numbers_of_a_log_in_other_units(plant, k):
         assert theirs.get("counts_per_rev") == sensor.get("counts_per_rev")
 
 
+def test_a_balanced_pendulum_in_counts_of_the_assumed_encoder_has_the_numbers_of_that_in_radians():
+    """Of 4096 a turn, as its draft says; where it is kept up is half of them from where it hangs."""
+    record, here = log("furuta", "balanced upright"), study("furuta", "balanced upright")
+    signals = {n: x if n == "u" else np.round(x * 4096 / math.tau) for n, x in record.signals.items()}
+    units = {n: "V" if n == "u" else "counts" for n in signals}
+    other = drafted(replace(record, signals=signals, units=units), "furuta")
+    for table in ("rig", "parameters", "actuator", "runs", "defaults"):
+        assert other[table] == here[table]
+    assert [s["counts_per_rev"]["value"] for s in other["sensors"].values()] == [4096, 4096]
+    assert other["sensors"]["theta"]["offset"] == -2048
+
+
 def loaded(record: Record, plant: str) -> Study:
     text = draft(record, inspect_record(record), Path("log.csv"), Path("study.toml"), plant=plant)
     return load_study(Path("study.toml"), text=text, records={"log.csv": record})

@@ -299,29 +299,47 @@ ASTRAY = 3.0
 STAYS = "Without that stretch the other runs were explained worse, so the fit keeps it."
 
 
-def refit_without_outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run], again: Callable[[Sequence[Run]], Fit]) -> Fit:
+@dataclass(frozen=True, kw_only=True)
+class ProvisionalFit:
+    """Where a search ended: values and scores of its `fit`, enough to see outliers by; `whole` adds all the rest.
+
+    Intervals, predictions and the verdict take as long as the search, and only one of several candidates needs them.
+    `interrupted` is the fit that an interrupted search gives.
+    """
+
+    fit: Fit
+    whole: Callable[[], Fit]
+    interrupted: Callable[[], Fit]
+
+
+def refit_without_outliers(
+    first: ProvisionalFit, rig: GreyBox, runs: Sequence[Run], again: Callable[[Sequence[Run], Fit], ProvisionalFit]
+) -> Fit:
     """The fit, or `again` without what the first one found strange; at most twice, as outliers hide each other.
 
-    Reasons are those that the last model gives: the first one was bent by what it had to explain.
+    `again` begins at the fit before. Reasons are those that the last model gives: the first one was bent by what it had
+    to explain.
     """
-    strange = outliers(fit, rig, runs)
-    first, retained = fit, list(runs)
+    strange = outliers(first.fit, rig, runs)
+    last, retained = first, list(runs)
     for _ in range(2):
         left = without_outliers(runs, strange)
         if not any(r.role == "fit" for r in left) or _same(left, retained):
             break
-        retained, new = left, again(left)
-        if explains_worse(new, first):
+        retained, new = left, again(left, last.fit)
+        if explains_worse(new.fit, first.fit):
+            fit = first.whole()
             sentences = tuple(f"Outlier: {o.sentence}" for o in strange)
-            return replace(first, warnings=(*first.warnings, *sentences, STAYS))
-        fit = new
-        if fit.interrupted:
+            return replace(fit, warnings=(*fit.warnings, *sentences, STAYS))
+        last = new
+        if last.fit.interrupted:
             break
-        strange = outliers(fit, rig, runs) or strange
+        strange = outliers(last.fit, rig, runs) or strange
+    fit = last.whole()
     if not strange:
-        return first
+        return fit
     sentences = [f"Outlier: {o.sentence}" for o in strange]
-    if fit is first:
+    if last is first:
         return replace(fit, warnings=(*fit.warnings, *sentences))
     absent = [r for r in runs if r.label not in fit.runs and (r.role == "fit" or not fit.interrupted)]
     missing = [replace(r, role="predict") for r in absent]
@@ -332,10 +350,10 @@ def refit_without_outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run], again: C
     return replace(
         fit,
         runs={label: scores[label] for label in order},
-        warnings=(*fit.warnings, *sentences, _compared(first, fit)),
+        warnings=(*fit.warnings, *sentences, _compared(first.fit, fit)),
         verdict=f"{fit.verdict} Left out of the fit as outliers, or in part: {names}; see the warnings.",
-        seconds=first.seconds + fit.seconds,
-        evaluations=first.evaluations + fit.evaluations,
+        seconds=first.fit.seconds + fit.seconds,
+        evaluations=first.fit.evaluations + fit.evaluations,
     )
 
 

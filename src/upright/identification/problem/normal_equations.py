@@ -72,8 +72,8 @@ def slopes(lanes: Array, steps: Array, *, central: bool = False) -> Array:
     return out
 
 
-def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array, scale: Array | None = None) -> Array:
-    """``B'B`` (p, p) of what p lanes miss and how they differ, ``B = (z_0 - y, z_1 - z_0, ...)`` times `weights`.
+def squares(lanes: Sequence[Array], target: Array, offset: Array, W: Array, scale: Array | None = None) -> Array:
+    """``B'B`` (p, p) of what p lanes miss and how they differ, ``B = W (z_0 - y, z_1 - z_0, ...)``.
 
     Parameters
     ----------
@@ -81,37 +81,29 @@ def squares(lanes: Sequence[Array], target: Array, offset: Array, weights: Array
         Simulated outputs, one after another; they are multiplied by `scale`, then `offset` is added, (outputs, p) each.
     target : (T, outputs) array
         Measured outputs.
+    W : (rows, outputs) array
+        Weights of the outputs, or of combinations of them; an output that has none may run away.
 
     Notes
     -----
-    In blocks small enough to stay near the processor, time along the fast axis.
+    In blocks small enough to stay near the processor.
     """
-    block = np.empty((offset.shape[1], 1024))
+    blocks = np.zeros((len(lanes), 512, offset.shape[1]))
     total = np.zeros((offset.shape[1],) * 2)
+    weighed = [int(k) for k in np.flatnonzero(np.any(W, axis=0))]
     with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the sum infinite
-        for k in map(int, np.flatnonzero(weights)):
-            for first in range(0, target.shape[0], block.shape[1]):
-                here = slice(first, first + block.shape[1])
-                B = block[:, : target[here].shape[0]]
-                if scale is None:
-                    np.add(lanes[k][here].T, offset[k][:, None], out=B)
-                else:
-                    np.multiply(lanes[k][here].T, scale[k][:, None], out=B)
-                    B += offset[k][:, None]
-                B[1:] -= B[0]
-                B[0] -= target[here, k]
-                total += weights[k] ** 2 * (B @ B.T)
+        for first in range(0, target.shape[0], blocks.shape[1]):
+            here = slice(first, first + blocks.shape[1])
+            B = blocks[:, : target[here].shape[0]]
+            for k in weighed:
+                z = lanes[k][here] if scale is None else np.multiply(lanes[k][here], scale[k], out=B[k])
+                np.add(z, offset[k], out=B[k])
+                B[k, :, 1:] -= B[k, :, :1]
+                B[k, :, 0] -= target[here, k]
+            for row in W[np.any(W, axis=1)]:
+                together = np.tensordot(row, B, axes=1)
+                total += together.T @ together
     return total if finite(total) else np.full_like(total, math.inf)
-
-
-def mixed(
-    lanes: Sequence[Array], target: Array, offset: Array, scale: Array | None, W: Array
-) -> tuple[list[Array], Array, Array, Array]:
-    """Arguments of `squares` for combinations ``W z`` of outputs, weights of one included."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        z = [lane * (1.0 if scale is None else scale[k]) + offset[k] for k, lane in enumerate(lanes)]
-        together = [sum((w * zk for w, zk in zip(row, z, strict=True)), np.zeros(())) for row in W]
-    return together, np.ascontiguousarray(target @ W.T), np.zeros_like(offset), np.ones(len(W))
 
 
 def products(J: Array, r: Array) -> tuple[Array, Array, float]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model.grey_box import GreyBox, base_values, neutral
 from upright.identification.model.runs import Run
-from upright.identification.problem.normal_equations import Normal, finite, mixed, products, slopes, squares
+from upright.identification.problem.normal_equations import Normal, finite, products, slopes, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
 from upright.identification.problem.simulated import (
     discrete_model,
@@ -334,10 +334,7 @@ class Problem:
         skip = min(track.first, n - 1)
         counts = slice(skip, n) if track.retained is None else np.flatnonzero(track.retained[:n])
         observed = [motion[counts, c] for c in track.columns]
-        if track.principal is None:
-            G = squares(observed, track.y[counts], d.offsets, track.weights, d.scales)
-        else:
-            G = squares(*mixed(observed, track.y[counts], d.offsets, d.scales, track.principal))
+        G = squares(observed, track.y[counts], d.offsets, track.weighting, d.scales)
         h = self.steps[sought]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])
