@@ -101,6 +101,12 @@ def run(
     if out is None:
         raise BadInput("the log of a run is kept: name a folder for it, such as out='runs'.")
     folder, on = page_folder(out, pdf), known_options(RunOptions, on, "run")
+    if not path_of(rig, "the rig that runs").exists():
+        from upright.readers.source import neighbour
+
+        raise BadInput(
+            f"There is no file '{rig}';{neighbour(Path(rig))} docs/howto/rigs.md says what a RIG.toml holds."
+        )
     leaning = _let_go(on.get("start"), path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
