@@ -46,9 +46,9 @@ def completed(
     hardware = replace(rig.hardware, vendor=chosen).with_entries(entries or {})
     if chosen:
         hardware = hardware.over(sheet(chosen, rig.plant, rig.unit))
-    asked = {"limit": "--limit 10", "servo_period": '--period "2 ms"', "travel": "--travel 0.2"}
-    asked |= {f"counts.{c.name}": "--counts 4096" for c in rig.plant.coordinates}
-    wanted = {n: option if options else "" for n, option in asked.items() if n.partition(".")[0] in needs}
+    needed = {"limit": "--limit 10", "servo_period": '--period "2 ms"', "travel": "--travel 0.2"}
+    needed |= {f"counts.{c.name}": "--counts 4096" for c in rig.plant.coordinates}
+    wanted = {n: option if options else "" for n, option in needed.items() if n.partition(".")[0] in needs}
     hardware.demand(wanted, who, sheet="--vendor NAME" if options else 'vendor = "NAME" in RIG.toml')
     if "delay" not in hardware.entries and "servo_period" in hardware.entries:
         late = Entry(value=hardware.entries["servo_period"].value, unit="s", source="assumed: one servo period")
