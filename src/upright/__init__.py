@@ -13,7 +13,7 @@
 
 Every verb of the command line, `upright NAME`, stands here under the same name and takes the same options
 (`upright plan-inertias` is `up.plan_inertias`, `upright log show` is `up.log_show`). Numbers are in SI and radians;
-text wears its unit: ``"12 deg"``.
+text is written with its unit: ``"12 deg"``.
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record

@@ -98,6 +98,12 @@ def run(
     from upright.running.run import RunRequest, run_rig
 
     folder, on = page_folder(out, pdf), known_options(RunOptions, on, "run")
+    if not path_of(rig, "the rig that runs").exists():
+        from upright.readers.source import neighbour
+
+        raise BadInput(
+            f"There is no file '{rig}';{neighbour(Path(rig))} docs/howto/rigs.md says what a RIG.toml holds."
+        )
     leaning = _let_go(on.get("start"), path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),

@@ -48,7 +48,7 @@ def test_the_page_of_a_minute_says_first_what_stops_it_and_gives_gains_in_the_un
     gains = next(
         t for p in chapter(result).parts for t in p.content if isinstance(t, Table) and "feedback" in t.caption
     )
-    assert [row[2] for row in gains.rows] == ["V/rad", "V s/rad"] * 2
+    assert [row[2] for row in gains.rows] == ["V/rad", "V/(rad/s)"] * 2
     stopped = chapter(replace(result, ended="the host went silent."))
     assert stopped.verdict.startswith("The swing-up was stopped after ")
     assert "the host went silent." in stopped.verdict

@@ -77,7 +77,7 @@ def export(
 
     to = str(to)
     if to not in TARGETS:
-        raise BadInput(f"--to is one of {', '.join(TARGETS)}, got '{to}'; {nearest(to, TARGETS)}")
+        raise BadInput(f"--to is the form to write, and there is no '{to}'; {nearest(to, TARGETS)}")
     target = TARGETS[to]
     if isinstance(target, LawTarget):
         if limit is not None:
