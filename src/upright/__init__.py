@@ -152,6 +152,7 @@ def __getattr__(name: str) -> Any:
         from upright.verbs.in_python import worded_for_python
 
         value = worded_for_python(value)
+        value.__module__, value.__qualname__ = "upright", name  # where pickle finds it
     globals()[name] = value
     return value
 

@@ -148,6 +148,12 @@ class Designed:
     holding: Holding | None = None
     cloud: Roots = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
 
+    def __dir__(self) -> list[str]:
+        return [
+            "K", "R", "basis", "chance", "chosen", "holding", "k_pf", "law", "model", "open_loop", "peak", "poles",
+            "request", "rig", "sampled", "verdict", "wanted",
+        ]  # fmt: skip
+
     @property
     def open_loop(self) -> Roots:
         """Poles of the model, the fastest growing first."""
