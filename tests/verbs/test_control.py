@@ -82,6 +82,7 @@ def test_a_design_that_cannot_be_had_is_said(study, options, sentence):
         (lambda: track(rig="furuta"), "--rig is rectilinear or torsional"),
         (lambda: track(sets=5), "sets 1 to 4"),
         (lambda: track(step=-1e-3), "--step needs a size above 0"),
+        (lambda: track(step="5 mm", limit=-1.0), "--limit must be above 0"),
         (lambda: track(poles=[-1, -2]), "needs 4 poles, got 2"),
     ],
 )
