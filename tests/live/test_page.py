@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -39,6 +40,14 @@ def test_the_page_tells_the_numbers_of_the_rig_in_their_units(written):
     assert ("servo period [ms]", "2.000") in told
     assert [value for what, value in told if what == "encoder counts"] == ["4096", "4096"]
     assert sum("friction" in what for what, _ in told) == sum(bool(v) for n, v in ARM.parameters().items() if "b" in n)
+
+
+def test_without_a_covariance_the_page_says_what_alone_varies(written, tmp_path):
+    blind = "The fit has no covariance: only dry friction and the hand vary."
+    assert blind in written[0].read_text("utf-8")
+    drawn = replace(RIG, draws=((RIG.plant, RIG.gain),) * 2)
+    up.play(drawn, poles=POLES, start="26 deg", draws=2, out=tmp_path / "play.html")
+    assert blind not in (tmp_path / "play.html").read_text("utf-8")
 
 
 def test_the_page_holds_no_address_and_evaluates_nothing(written):

@@ -77,6 +77,8 @@ def test_a_design_that_cannot_be_had_is_said(study, options, sentence):
         (lambda: regulate(start="5 kg"), "rad"),
         (lambda: swing_up(travel=-1.0), "--travel must be above 0"),
         (lambda: swing_up(seconds=0.5), "from 1 to 120 s"),
+        (lambda: swing_up(seconds=1, fault="theta=0"), "a factor between"),
+        (lambda: swing_up(seconds=120, fault="theta=0"), "a factor between"),
         (lambda: swing_up(fault={"phi": 2}), "fault names a coordinate"),
         (lambda: swing_up(fault="theta=0"), "a factor between"),
         (lambda: track(rig="furuta"), "--rig is rectilinear or torsional"),
