@@ -141,6 +141,8 @@ class TextTable:
         Line number of the first row in the file, counted from 1.
     named : bool
         Whether the log itself names its columns.
+    began : str
+        Date and time of the first row, where the first column holds such instead of seconds.
     """
 
     source: Source
@@ -151,6 +153,7 @@ class TextTable:
     start: int = 0
     decimal_comma: bool = False
     named: bool = True
+    began: str = ""
 
     @property
     def body(self) -> str:
