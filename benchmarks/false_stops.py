@@ -28,7 +28,7 @@ from benchmarks.hazards.sound import MAKES, Breaking, Lane, Played
 from benchmarks.measure import Line, Target, page
 from upright.rig.makes import make_rig
 
-LANES, SECONDS, FIRST = 30, 600.0, 1001
+LANES, SECONDS, FIRST = 30, 600.0, 6001
 BROKEN, AFTER, WATCHED = 12, 5.0, 25.0
 
 
