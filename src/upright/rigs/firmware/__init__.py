@@ -7,6 +7,6 @@ from upright.rigs.firmware.pins import Pin, pins
 from upright.rigs.firmware.wiring import wiring
 
 __all__ = [
-    "BOARDS", "BoardKind", "Flashed", "Image", "Pin", "board_of", "build_image", "ceilings_in_words", "ceilings_of", "flash",
-    "pins", "sources", "wiring",
+    "BOARDS", "BoardKind", "Flashed", "Image", "Pin", "board_of", "build_image", "ceilings_in_words", "ceilings_of",
+    "flash", "pins", "sources", "wiring",
 ]  # fmt: skip
