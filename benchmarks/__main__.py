@@ -6,12 +6,9 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 import platform
 import sys
-import time
-import traceback
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -22,6 +19,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.measure import Line
+from benchmarks.measured import measured, module
 from upright.errors import BadInput
 from upright.workers import Workers
 
@@ -102,7 +100,9 @@ def main(arguments: list[str] | None = None) -> int:
         help=f"which ones, of {', '.join(NAMES)}; default: all but {', '.join(APART)}",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write every figure to a file too")
-    parser.add_argument("--quick", action="store_true", help="fewer rounds and smaller shares, two to three minutes")
+    parser.add_argument(
+        "--quick", action="store_true", help="fewer rounds and smaller shares, some three minutes on two processors"
+    )
     parser.add_argument("--full", action="store_true", help="run what is otherwise estimated from its parts")
     pages = ", ".join(PUBLISHED)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help=f"write the page of one of {pages}")
@@ -111,7 +111,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--workers",
         type=int,
         metavar="N",
-        help=f"processes for {', '.join(SHARED)}; default 1; with --quick and for mutants 2",
+        help=f"processes for {', '.join(SHARED)}; default 1, for mutants 2",
     )
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     changes = parser.add_argument_group("mutants")
@@ -148,7 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     asked = parser.parse_args(arguments)
     try:
-        shared = {"workers": Workers(number=asked.workers or (2 if asked.quick else 1), cluster=asked.cluster)}
+        shared = {"workers": Workers(number=asked.workers or 1, cluster=asked.cluster)}
     except BadInput as error:
         parser.error(str(error))
     if asked.markdown and (len(asked.names) != 1 or asked.names[0] not in PUBLISHED):
@@ -169,27 +169,22 @@ def main(arguments: list[str] | None = None) -> int:
             "seconds": asked.seconds,
         },
     }  # fmt: skip
-    for name in asked.names or [name for name in NAMES if name not in APART]:
-        extra = options.get(name, {})
-        extra |= {"markdown": asked.markdown} if name in PUBLISHED else {}
-        extra |= shared if name in SHARED else {}
-        begin = time.perf_counter()
-        try:
-            module = importlib.import_module(f"benchmarks.{name}")
-            lines: list[Line] = module.run(
-                quick=asked.quick,
-                progress=lambda text, name=name: told.print(f"[dim]{name}: {escape(text)}[/]"),
-                **extra,
-            )
-        except Exception:
+    names = asked.names or [name for name in NAMES if name not in APART]
+    extras = {
+        name: options.get(name, {})
+        | ({"markdown": asked.markdown} if name in PUBLISHED else {})
+        | (shared if name in SHARED else {})
+        for name in names
+    }
+    for name, lines, seconds in measured(names, extras, quick=asked.quick):
+        if lines is None:
             told.print(f"[red]{name} failed[/]")
-            traceback.print_exc()
             failed.append(name)
             continue
-        console.print(table(name, (module.__doc__ or "").splitlines()[0], lines))
+        console.print(table(name, (module(name).__doc__ or "").splitlines()[0], lines))
         results["lines"] += [{"benchmark": name} | asdict(line) | {"reached": line.reached} for line in lines]
         missed += sum(line.reached is False for line in lines)
-        told.print(f"[dim]{name}: {time.perf_counter() - begin:.0f} s[/]")
+        told.print(f"[dim]{name}: {seconds:.0f} s[/]")
     if asked.json:
         asked.json.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     if failed:

@@ -105,7 +105,7 @@ def test_a_record_a_frame_and_a_study_give_the_same_fit(fit, tmp_path):
         ({"ask": ["l_cgg"]}, "did you mean 'l_cg'"),
         ({"columns": {"theta": "angle"}}, "no column 'angle'"),
         ({"units": {"angle": "deg"}}, "units names columns"),
-        ({"method": "newton"}, "must be one of"),
+        ({"method": "newton"}, "there is no 'newton'"),
         ({"plant": 3}, "a plant such as up.Pendulum"),
         ({"plant": "pendulumm"}, "no plant is called"),
     ],

@@ -412,3 +412,31 @@ def test_an_array_of_gains_for_a_force_is_not_taken_for_gains_of_a_command():
     held = up.simulate(turned, by_force / -0.65, at="inverted", start={"theta": 0.02}, seconds=4)
     assert abs(held["theta"][-1] - np.pi) < 0.01
     assert abs(up.simulate(RIG, by_force, at="inverted", start={"theta": 0.02}, seconds=4)["theta"][-1] - np.pi) < 0.01
+
+
+def test_what_dir_shows_of_a_fit_is_there_and_documented(fit):
+    """Nothing of the search's own bookkeeping, and each name in the class's table or with a docstring of its own."""
+    from upright.verbs.model.fit import FitAnswer
+
+    needed = {"residuals", "parameters", "verdict", "plot", "predict", "report", "rig"}
+    assert needed <= set(dir(fit))
+    assert len(dir(fit)) <= 25
+    table = (FitAnswer.__doc__ or "").partition("Attributes\n")[2]
+    for name in dir(fit):
+        assert getattr(fit, name) is not None
+        documented = any(name in line.split(" : ")[0].split(", ") for line in map(str.strip, table.splitlines()))
+        assert documented or getattr(FitAnswer, name).__doc__, name
+
+
+def test_what_dir_shows_of_a_design_is_there(design):
+    assert {"K", "poles", "law", "rig", "verdict", "plot", "report", "numbers"} <= set(dir(design))
+    assert len(dir(design)) <= 25
+    for name in dir(design):
+        getattr(design, name)
+
+
+def test_methods_of_a_fit_name_arguments_where_the_command_line_names_options(fit):
+    with pytest.raises(up.BadInput, match="largest command") as missing:
+        fit.play()
+    assert "limit=10" in str(missing.value)
+    assert "--" not in str(missing.value)

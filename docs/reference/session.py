@@ -226,7 +226,7 @@ up.track(rig="rectilinear", sets=2)
 with open("RIG.toml", "w") as file:
     file.write('kind = "twin"\nmake = "furuta"\nat = "inverted"\n')
 up.regulate(rig="furuta", draws=20, out="regulate")
-up.run("RIG.toml", law="regulate/design.json", duration=5)
+up.run("RIG.toml", law="regulate/design.json", duration=5, out="upright-run")
 
 # %% rig_doctor
 up.rig_doctor("RIG.toml")
@@ -257,7 +257,7 @@ up.firmware_build(board="mega", drive="pair", out="firmware")
 
 # %% firmware_flash
 try:
-    up.firmware_flash(board="mega", port="/dev/no-board")
+    up.firmware_flash(board="mega", port="/dev/no-board", out="firmware")
 except up.UprightError as error:
     print(error)
 

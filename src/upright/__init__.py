@@ -13,7 +13,7 @@
 
 Every verb of the command line, `upright NAME`, stands here under the same name and takes the same options
 (`upright plan-inertias` is `up.plan_inertias`, `upright log show` is `up.log_show`). Numbers are in SI and radians;
-text wears its unit: ``"12 deg"``.
+text is written with its unit: ``"12 deg"``.
 
 ==========  ==================================================================================================
 Log         read, show, doctor, init, law; Record
@@ -152,6 +152,7 @@ def __getattr__(name: str) -> Any:
         from upright.verbs.in_python import worded_for_python
 
         value = worded_for_python(value)
+        value.__module__, value.__qualname__ = "upright", name  # where pickle finds it
     globals()[name] = value
     return value
 

@@ -48,6 +48,16 @@ def fit_file(folder: Path, stderr: float) -> Path:
     return path
 
 
+def test_a_fit_plays_from_the_command_line_as_in_python(tmp_path):
+    """Options that are not typed are those of `up.play`; the number of rigs came as None and ended in a TypeError."""
+    page = tmp_path / "play.html"
+    words = ["play", fit_file(tmp_path, 1e-3), "--poles", POLES, "--limit", "1", "--seconds", "0.1", "-o", page]
+    outcome = CliRunner().invoke(app, [*map(str, words)], terminal_width=200)
+    assert outcome.exit_code in (0, 3), outcome.stderr
+    assert "of 200 rigs" in " ".join(outcome.stdout.split())
+    assert page.exists()
+
+
 @pytest.mark.slow
 def test_the_gains_hold_the_nonlinear_rig(study, tmp_path):
     outcome = design(study, "--poles", POLES, "--limit", "0.6", "-o", tmp_path)

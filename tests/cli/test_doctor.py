@@ -107,7 +107,7 @@ def test_instants_written_twice_are_dropped_and_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("missing.csv",), "does not exist"),
+        (("missing.csv",), "There is no file"),
         (("swing.csv", "--rig", "furutta"), "furuta"),
         (("swing.csv", "--rig", "none.toml"), "none.toml"),
         (("swing.csv", "--html", "."), "is a folder"),

@@ -224,7 +224,7 @@ def test_init_does_not_overwrite_unless_told(bench):
         (["predict", "study.toml", "study.toml"], "no fit.json"),
         (["predict", "empty.json", "study.toml"], "lacks the keys"),
         (["predict", "chain.json", "study.toml"], "both must be the same plant"),
-        (["init", "gone.csv"], "does not exist"),
+        (["init", "gone.csv"], "There is no file"),
         (["init", "."], "is a folder"),
         (["init", "one.csv", "--plant", "furutta", "-o", "x.toml"], "did you mean 'furuta'?"),
         (["init", "one.csv", "--plant", "rectilinear-1", "-o", "x.toml"], "choose another --plant"),

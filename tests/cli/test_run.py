@@ -56,7 +56,7 @@ def test_a_rig_that_is_wired_as_described_passes_and_the_machine_is_measured(ben
 def test_mistakes_are_answered_in_a_sentence(bench):
     for words, said in (
         (["run", "--rig", "RIG.toml"], "needs either a law"),
-        (["run", "--rig", "NO.toml", "--law", "design.json"], "was not found"),
+        (["run", "--rig", "NO.toml", "--law", "design.json"], "There is no file"),
         (["run", "--rig", "RIG.toml", "--law", "RIG.toml"], "no JSON"),
         (["run", "--rig", "RIG.toml", "--law", "design.json", "--reference", "step 0.1"], "follows no reference"),
         (["rig", "doctor", "design.json"], "TOML"),

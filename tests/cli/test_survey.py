@@ -50,7 +50,7 @@ def test_answers_of_people_are_compared(tmp_path):
         (["table_4.csv"], "say with --n how many answers"),
         (["synthetic_wide.csv", "--n", "24"], "--n is for printed summaries"),
         (["synthetic_wide.csv", "--scale", "four"], "such as 1-4"),
-        (["none.csv"], "does not exist"),
+        (["none.csv"], "There is no file"),
     ],
 )
 def test_what_cannot_be_judged_is_said(tmp_path, arguments, sentence):

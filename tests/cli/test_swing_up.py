@@ -43,7 +43,7 @@ def test_a_lying_encoder_ends_it_with_a_sentence(tmp_path):
 def test_what_cannot_be_done_is_said_in_a_sentence(tmp_path):
     for arguments, words in (
         (("--rig", "torsional"), "needs a pendulum theta on a driven body"),
-        (("--rig", "balloon"), "there is no make 'balloon'"),
+        (("--rig", "balloon"), "there is no rig model 'balloon'"),
         (("--fault", "phi=2"), "--fault names a coordinate"),
         (("--fault", "theta=zero"), "needs a factor"),
         (("--travel", "-1"), "--travel must be above 0"),

@@ -90,9 +90,12 @@ def test_gain_and_dead_zone_of_the_drive_follow_beside_each_other(dead_zone, sha
 
 
 def test_a_late_drive_is_late_by_as_much():
+    """By whole samples, of which the nearest is found."""
     t, q, u = moved(late=0.012)
     found = check_wiring(RIG, t, counted(q, 1.0, 1.0), u)
-    assert found.delay == pytest.approx(0.012, abs=2 * PERIOD)
+    assert found.delay == pytest.approx(0.012, abs=PERIOD / 2)
+    prompt = check_wiring(RIG, *moved()[:1], counted(moved()[1], 1.0, 1.0), u)
+    assert prompt.delay == 0.0
 
 
 def test_an_encoder_that_shows_nothing_is_named_instead_of_its_sign():

@@ -49,11 +49,11 @@ def tables(told):
     [
         ({}, None, ""),
         ({"modulus": 0.41, "least_gain": 0.69, "delay": 2.01e-3}, 0.991, ""),
-        ({"modulus": 0.39}, None, "distance to -1 is only 0.39"),
+        ({"modulus": 0.39}, None, "modulus margin is only 0.39"),
         ({"least_gain": 0.71}, None, "a gain 29 % weaker makes it unstable"),
         ({"delay": 1.9e-3}, None, "it bears only 1.9 ms more delay"),
         ({}, 0.98, "2 % of the rigs sampled from the fit's covariance are unstable with it"),
-        ({"modulus": 0.3, "delay": 1e-3}, None, "distance to -1 is only 0.30; it bears only 1 ms more delay"),
+        ({"modulus": 0.3, "delay": 1e-3}, None, "modulus margin is only 0.30; it bears only 1 ms more delay"),
     ],
 )
 def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, words):
@@ -64,7 +64,7 @@ def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, 
     page = chapter(told)
     assert page.sound == (not words)
     offered = any("--sampled" in step.command for step in page.steps)
-    assert offered == ("distance" in words)
+    assert offered == ("modulus margin" in words)
 
 
 def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(done):

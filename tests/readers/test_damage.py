@@ -24,6 +24,7 @@ def source(data: bytes) -> Source:
         (b"", "the file is empty"),
         (b" \r\n \n", "the file is empty"),
         (b"t,x\n0,1\n1,two\n", "line 3, column 2 \\(x\\).*'two'"),
+        (b"t,x,note\n0,1,\n1,2,\n2,3,\n", "column 3 \\(note\\).*empty in every row; delete"),
         (b"t,x\n0,1\n1,\n2,3\n", "line 3, column 2 \\(x\\).*empty cell"),
         (b"t,x\n0,1\n1,nan\n", "line 3, column 2 \\(x\\).*'nan'"),
         (b"t,x\n0,1\n1,1e999\n", "line 3, column 2 \\(x\\).*too large"),

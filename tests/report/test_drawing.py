@@ -165,6 +165,47 @@ def test_markup_in_a_page_has_ids_of_its_own_and_is_as_wide_as_it_was_drawn():
     assert 'style="max-width:100%"' in svg(figure(1.0, 2 * WIDTH), "wide")
 
 
+def test_markup_in_a_page_is_well_formed_where_groups_are_empty_too():
+    """An axis without labels and a curve without points are empty groups."""
+    from xml.etree import ElementTree
+
+    drawing = figure(1.0)
+    ax = drawing.add_subplot()
+    ax.plot([], [])
+    ax.scatter([], [])
+    ax.fill_between([], [], [])
+    text = svg(drawing, "a").replace("<svg", '<svg xmlns:xlink="http://www.w3.org/1999/xlink"', 1)
+    assert ElementTree.fromstring(text).tag == "svg"
+
+
+def places(path: str) -> np.ndarray:
+    """Points of a path of straight lines, by the rules of SVG: M and L absolute, l relative."""
+    here, points, command = np.zeros(2), [], ""
+    words = iter(re.findall(r"[a-zA-Z]|-?(?:\d+\.?\d*|\.\d+)", path))
+    for word in words:
+        if word.isalpha():
+            command = word
+            continue
+        place = np.array([float(word), float(next(words))])
+        here = here + place if command == "l" else place
+        command = "l" if command == "l" else "L"
+        points.append(here)
+    return np.array(points)
+
+
+def test_a_curve_in_a_page_lies_where_matplotlib_puts_it_to_a_hundredth_of_a_point():
+    """However many places are counted one from the other, rounding does not add up."""
+    t = np.linspace(0, 10, 300)
+    y = np.random.default_rng(4).uniform(1, 2, size=t.size) * (-1) ** np.arange(t.size)  # no place between two others
+    drawing = figure(2.0, margins=(0.8, 0.2, 0.3, 0.5))
+    ax = drawing.add_subplot()
+    ax.plot(t, y)
+    drawn = max(re.findall(r' d="([^"]*)"', svg(drawing, "a")), key=len)
+    at = ax.transData.transform(np.column_stack([t, y])) * 72 / drawing.dpi
+    expected = np.column_stack([at[:, 0], 72 * 2.0 - at[:, 1]])
+    np.testing.assert_allclose(places(drawn)[: t.size], expected, rtol=0, atol=0.0051)
+
+
 @pytest.mark.parametrize(("name", "form"), [("a.svg", "svg"), ("b.PNG", "png")])
 def test_a_picture_s_format_is_its_ending(name, form):
     assert picture_format(Path(name)) == form

@@ -166,6 +166,21 @@ def test_nobody_there_is_told_in_time():
     assert board.closed == 1
 
 
+@pytest.mark.parametrize(("boots", "patience", "there"), [(3.7, 0.5, True), (4.1, 0.5, False), (5.9, 6.0, True)])
+def test_a_board_that_restarts_when_its_port_is_opened_has_the_time_of_its_boot_loader(boots, patience, there):
+    class Booting(FakeBoard):
+        def write(self, data):
+            if self.now >= boots:
+                super().write(data)
+
+    board = Booting()
+    if there:
+        assert opened(board, patience=patience).open().name == "fake on nowhere"
+    else:
+        with pytest.raises(RigStopped, match="did not answer for 4 s"):
+            opened(board, patience=patience)
+
+
 def test_what_answers_something_else_is_no_answer():
     board = FakeBoard()
     rig = opened(board)

@@ -70,14 +70,14 @@ def bench(tmp_path, monkeypatch):
 def test_such_a_law_is_not_armed(bench):
     bench(NOT_TRUSTED)
     with pytest.raises(BadInput, match=r"not armed on hardware.*explained to 41 %.*accept"):
-        up.run("RIG.toml", law="design/design.json")
+        up.run("RIG.toml", law="design/design.json", out="runs")
 
 
 @pytest.mark.parametrize("accept", ["", "  "])
 def test_silence_is_no_reason(bench, accept):
     bench(NOT_TRUSTED)
     with pytest.raises(BadInput, match="not armed on hardware"):
-        up.run("RIG.toml", law="design/design.json", accept=accept)
+        up.run("RIG.toml", law="design/design.json", out="runs", accept=accept)
 
 
 @pytest.mark.slow
@@ -85,7 +85,7 @@ def test_silence_is_no_reason(bench, accept):
 def test_with_a_reason_or_some_trust_it_goes_as_far_as_the_wire(bench, level, accept):
     bench(level)
     with pytest.raises(BadInput, match="port /dev/no_such_board"):
-        up.run("RIG.toml", law="design/design.json", accept=accept)
+        up.run("RIG.toml", law="design/design.json", out="runs", accept=accept)
 
 
 def test_a_design_that_does_not_say_counts_as_not_trusted(bench):
@@ -96,7 +96,7 @@ def test_a_design_that_does_not_say_counts_as_not_trusted(bench):
     with open("design/design.json", "w", encoding="utf-8") as file:
         json.dump(content, file)
     with pytest.raises(BadInput, match="does not say whether it can be trusted"):
-        up.run("RIG.toml", law="design/design.json")
+        up.run("RIG.toml", law="design/design.json", out="runs")
 
 
 def test_the_log_keeps_the_reason(bench, tmp_path):
@@ -104,7 +104,7 @@ def test_the_log_keeps_the_reason(bench, tmp_path):
     untrusted = model.replace(basis=Basis(level=NOT_TRUSTED, sentence="The runs are explained to 41 %."))
     up.design(untrusted, out="design")
     (tmp_path / "twin.toml").write_text('kind = "twin"\nmake = "furuta"\nseed = 3\n', encoding="utf-8")
-    done = up.run("twin.toml", law="design/design.json", duration=0.2, accept="held by a string")
+    done = up.run("twin.toml", law="design/design.json", out="runs", duration=0.2, accept="held by a string")
     (kept,) = [e.text for e in read_log(done.value.log_path).events if e.kind == "accepted"]
     assert "not trusted" in kept
     assert "held by a string" in kept

@@ -98,6 +98,8 @@ def test_units_groups_and_scores_are_read_under_their_names():
 def test_the_drive_of_an_older_fit_is_told_by_what_differs_from_none():
     entries = model().hardware.entries
     assert set(entries) == {"gain", "delay"}
+    plain = model(parameters=FIT["parameters"] | {"actuator.limit": 10.0}).hardware.entries["limit"]
+    assert (plain.value, plain.unit, plain.source) == (10.0, "", "known")
     assert (entries["gain"].value, entries["gain"].unit, entries["gain"].source) == (4.0, "N/V", "identified")
     assert entries["delay"].source == "known"
     stated = FIT["parameters"] | {"actuator.delay": {"value": 2e-3, "stderr": 1e-4, "unit": "s"}}

@@ -50,7 +50,7 @@ def test_arrays_without_a_period_are_a_model_at_its_samples():
         (lambda: up.prefilter(MODEL, [1, 2], output=-1), "output is a number from 0 to 1 or one of"),
         (lambda: up.place(MODEL, [object()]), "poles are complex numbers, or a text"),
         (lambda: up.dlqr(up.Pendulum(m_p=0.2, l_cg=0.2).linear(), [1, 1], 1.0), "this one is continuous"),
-        (lambda: up.identify("a.toml", method="guess"), "method must be one of"),
+        (lambda: up.identify("a.toml", method="guess"), "there is no 'guess'"),
         (lambda: up.identify(up.Pendulum(m_p=0.2, l_cg=0.2, J_p=1e-3)), "takes a log of it first"),
         (lambda: up.identify(RECORD, 3), r"takes a plant such as up\.Pendulum"),
         (lambda: up.identify("a.toml", up.Pendulum), "plant belongs to a log"),

@@ -59,7 +59,7 @@ def test_a_plan_is_as_exact_as_a_straight_line_can_be():
         (lambda: frequency(ask="noise"), "sines, multisine, sweep"),
         (lambda: frequency(rig="furuta", known={"m_p": 0.1}), "belongs to a log"),
         (lambda: predict("fit.json", "study.toml"), "the model fit.json does not exist"),
-        (lambda: ladder("study.toml"), "the study study.toml does not exist"),
+        (lambda: ladder("study.toml"), "There is no study 'study.toml'; check the path. `upright init LOG"),
     ],
 )
 def test_what_cannot_be_used_is_said(tmp_path, monkeypatch, call, sentence):

@@ -35,3 +35,21 @@ def test_files_are_written_into_the_folder_that_is_named(verb, tmp_path, monkeyp
 def test_a_pdf_needs_a_folder():
     with pytest.raises(up.BadInput, match="none was named"):
         up.swing_up(RIG, pdf=True)
+
+
+def test_an_export_is_in_memory_where_no_folder_is_named_and_the_same_in_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    law = up.design(RIG, speed="plain").law
+    for source, to in ((law, "c"), (law, "python"), (RIG, "mjcf")):
+        held = up.export(source, to=to)
+        assert not list(tmp_path.iterdir())
+        stored = up.export(source, to=to, out=tmp_path.parent / f"stored-{to}")
+        assert {f.name: f.read_bytes() for f in stored.files} == held.contents
+
+
+@pytest.mark.parametrize("verb", ["run", "firmware_build", "firmware_flash"])
+def test_what_cannot_be_but_a_file_asks_for_its_folder(verb, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(up.BadInput, match="name a folder for it, such as out="):
+        getattr(up, verb)(*(["RIG.toml"] if verb == "run" else []))
+    assert not list(tmp_path.iterdir())

@@ -35,7 +35,7 @@ def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = "."
     if design.request.proposed is not None:
         gains.append(
             f"No poles were requested. These are proposed: {design.request.proposed:g} times as fast as the model "
-            "falls or swings by itself, the quietest of those whose loop keeps nearly the largest distance to -1. Ask "
+            "falls or swings by itself, the quietest of those with nearly the largest modulus margin. Ask "
             "for others with --poles or --lqr."
         )
     if design.placement is not None:
@@ -154,7 +154,7 @@ def _outlasting(design: Designed, poles: Roots, digits: int) -> str:
 def _way_table(design: Designed) -> Table:
     """Velocities by difference, filtered difference and Kalman filter, side by side."""
     rows = tuple((way.name + (" (chosen)" if way is design.chosen else ""), *_worth(way)) for way in design.ways)
-    margins = ("gain between", "phase [deg]", "delay [ms]", "distance")
+    margins = ("gain between", "phase [deg]", "delay [ms]", "modulus margin")
     caption = "factors on the command, phase, more delay, distance of the loop gain to −1; all with the same gains"
     if design.chosen.speed_noise is None:
         return Table(caption=f"Margins: {caption}", headings=("states from", *margins), rows=rows, numbers=(2, 3, 4))
@@ -303,7 +303,7 @@ def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
     if design.request.poles is not None and not design.model.dt is not None:
         limit = " --limit LIMIT" if design.request.limit is None else ""
         steps.append(
-            Step("Let the drive's limit choose: the cheapest effort that comes back from this start.",
+            Step("Use LQR, its effort weight chosen by the drive's limit for this start.",
                  f"{base} --lqr {','.join('1' for _ in design.model.states)}{limit}")
         )  # fmt: skip
     if isinstance(design.rig, Rig) and not design.rig.draws:
@@ -317,7 +317,7 @@ def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
                  f"upright export {folder}/design.json --to c")
         )  # fmt: skip
     steps.append(
-        Step(f"Simulate it: upright.laws.of_values makes the law of what stands as law in {folder}/design.json.")
+        Step(f"Simulate it: `upright.laws.of_values` reads the law from {folder}/design.json.")
     )  # fmt: skip
     if not plain_matrices:
         steps.append(Step("Run it on the rig, or on its twin (RIG.toml: docs/howto/rigs.md).",

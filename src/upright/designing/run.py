@@ -148,6 +148,12 @@ class Designed:
     holding: Holding | None = None
     cloud: Roots = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
 
+    def __dir__(self) -> list[str]:
+        return [
+            "K", "R", "basis", "chance", "chosen", "holding", "k_pf", "law", "model", "open_loop", "peak", "poles",
+            "request", "rig", "sampled", "verdict", "wanted",
+        ]  # fmt: skip
+
     @property
     def open_loop(self) -> Roots:
         """Poles of the model, the fastest growing first."""
@@ -199,7 +205,7 @@ class Designed:
         out = [
             text
             for text, bad in (
-                (f"distance to -1 is only {m.modulus:.2f}", m.modulus < 0.4),
+                (f"modulus margin is only {m.modulus:.2f}", m.modulus < 0.4),
                 (f"a gain {100 * (1 - m.least_gain):.0f} % weaker makes it unstable", m.least_gain > 0.7),
                 (f"it bears only {1e3 * m.delay:.2g} ms more delay", m.delay < self.request.period),
                 (f"{100 * (1 - (chance or 0)):.0f} % of the rigs sampled from the fit's covariance are unstable with "

@@ -195,7 +195,8 @@ def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
         return find(text), Wiring()
     except BadInput as error:
         raise BadInput(
-            f"--rig {text}: {error} A rig is a plant's name, a study (TOML), a fit.json or an MJCF file."
+            f"--rig {text}: {str(error).rstrip('.')}. A rig is a plant's name, a study (TOML), a fit.json or an MJCF "
+            "file."
         ) from None
 
 

@@ -85,8 +85,10 @@ def _next_steps(diagnosis: Diagnosis, log: Path, rig: str, page: bool) -> list[S
         choice = " or ".join(diagnosis.rigs)
         sentence = f"Name the rig, so that signs and scales can be checked; these columns would suit {choice}."
         steps.append(Step(sentence, f"{again} --rig {diagnosis.rigs[0]}"))
-    init = f"upright init {typed(log)} -o study.toml"
-    return [*steps, Step("Write a study, with the keys named above.", init)]
+    if rig.endswith((".toml", ".json")):
+        return steps
+    keys = ", with the keys named above" if any(finding.key for finding in diagnosis.findings) else ""
+    return [*steps, Step(f"Write a study{keys}.", f"upright init {typed(log)} -o study.toml")]
 
 
 @styled

@@ -100,7 +100,7 @@ def load(path: PathLike) -> Source:
     except BadInput:
         raise
     except FileNotFoundError:
-        raise BadInput(f"There is no file '{name}';{_neighbour(Path(path))}") from None
+        raise BadInput(f"There is no file '{name}';{neighbour(Path(path))}") from None
     except (OSError, ValueError) as error:
         raise BadInput(f"'{name}' cannot be read: {error}; check its name and permissions.") from None
     source = Source(file=name, data=data)
@@ -109,7 +109,8 @@ def load(path: PathLike) -> Source:
     return source
 
 
-def _neighbour(path: Path) -> str:
+def neighbour(path: Path) -> str:
+    """What to try where a file is missing: the one called almost so, or what is wrong with the folder."""
     from difflib import get_close_matches
 
     try:
@@ -191,6 +192,12 @@ class TextTable:
 
     def _row_by_row(self, lines: list[str]) -> Array:
         rows: list[list[float]] = []
+        texts = [line.split(self.delimiter) for line in lines if line.strip()]
+        for j, name in enumerate(self.names):
+            if all(len(row) > j and not row[j].strip() for row in texts):
+                raise self.source.bad(
+                    "this column is empty in every row; delete it", line=self.first_line, column=j + 1, name=name
+                )
         last = max(i for i, line in enumerate(lines) if line.strip())
         for i, line in enumerate(lines):
             if not line.strip():

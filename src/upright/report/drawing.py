@@ -141,13 +141,17 @@ def svg(drawing: Figure, name: str) -> str:
         )
     text = page.getvalue()
     text = text[text.index("<svg") :]
-    # `Figure.savefig` writes six decimals; a hundredth of a point is finer than any printer
+    # `Figure.savefig` writes six decimals and a name for every group; a hundredth of a point is finer than any printer
     text = re.sub(r'(?<= d=")[^"]*', _short, text)
+    text = re.sub(r'(?<= )([xy]=")([-\d.]+)', lambda m: f"{m[1]}{float(m[2]):.2f}", text)
+    text = re.sub(r' transform="rotate\(-0 [^"]*"', "", text)
+    text = re.sub(r"</?g\b[^>]*>", _Ungrouped(), text)
     text = re.sub(r'\b(id=")', rf"\1{name}-", text)
     text = re.sub(r"(url\(#|href=\"#)", rf"\1{name}-", text)
     text = re.sub(r'\s(xmlns|xmlns:xlink|version)="[^"]*"', "", text)
-    text = re.sub(r"\n\s*", "\n", text)
+    text = re.sub(r"(\s*\n)+\s*", "\n", text)
     text = re.sub(r"(?<=: )#[0-9a-fA-F]{6}\b", _replaceable, text)
+    text = re.sub(r'(?<=style=")[^"]*', lambda style: re.sub(r"([;:]) ", r"\1", style[0]), text)
     opening = text[: text.index(">")]
     responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
@@ -155,10 +159,42 @@ def svg(drawing: Figure, name: str) -> str:
 
 
 def _short(path: re.Match[str]) -> str:
-    """A path in hundredths of a point, without the zeros and blanks that nobody needs."""
-    rounded = re.sub(r"(\.\d\d)\d+", r"\1", path[0])
-    numbers = re.sub(r"(\.\d*[1-9])0+(?!\d)|\.0+(?!\d)", r"\1", rounded)
-    return re.sub(r"\s*([MLCQZz])\s*", r"\1", numbers)
+    """A path in hundredths of a point, every place counted from the one before it, which takes half the digits."""
+    text, command_before, before = "", "", ""
+    first = here = (0, 0)
+    for command, numbers in re.findall(r"([MLCQZz])([^MLCQZz]*)", path[0]):
+        hundredths = [round(100 * float(n)) for n in numbers.split()]
+        places = list(zip(hundredths[::2], hundredths[1::2], strict=True))
+        own = "M" if command == "M" else command.lower()
+        if own != command_before:
+            text, before = text + own, ""
+        origin = (0, 0) if own == "M" else here
+        for number in (_digits(v - o) for place in places for v, o in zip(place, origin, strict=True)):
+            closed = not before or number.startswith("-") or (number.startswith(".") and "." in before)
+            text, before = f"{text}{number}" if closed else f"{text} {number}", number
+        here, command_before = places[-1] if places else first, own
+        first = here if own == "M" else first
+    return text
+
+
+def _digits(hundredths: int) -> str:
+    """A number of hundredths without the zeros that nobody needs."""
+    return re.sub(r"^(-?)0(?=\.)", r"\1", f"{hundredths / 100:.2f}".rstrip("0").rstrip(".")) if hundredths else "0"
+
+
+class _Ungrouped:
+    """Leaves out groups that say nothing, in a text that is read from its beginning."""
+
+    def __init__(self) -> None:
+        self.kept: list[bool] = []
+
+    def __call__(self, tag: re.Match[str]) -> str:
+        if tag[0].endswith("/>"):
+            return ""  # empty
+        if tag[0] == "</g>":
+            return tag[0] if self.kept.pop() else ""
+        self.kept.append(not re.fullmatch(r'<g(?: id="[^"]*")?>', tag[0]))
+        return tag[0] if self.kept[-1] else ""
 
 
 def _replaceable(colour: re.Match[str]) -> str:

@@ -18,6 +18,7 @@ from upright.report.page import Block, Book, Chapter, KeyNumber, Live, Part, Pic
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
 
 _FRAGMENTS = count(1)  # ids differ between the cells of a notebook
 _ID = re.compile(r'\b(id="|url\(#|href="#)')
@@ -108,8 +109,15 @@ def _rendered(template: str, **values: Any) -> str:
 
     return rendered(
         "upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__,
-        tone=tone, breadth=breadth, brief=brief, scale=shared_scale, evidence=evidence,
+        framed=framed, tone=tone, breadth=breadth, brief=brief, scale=shared_scale, evidence=evidence,
     )  # fmt: skip
+
+
+def framed(page: str) -> Markup:
+    """A page as it stands in the attribute of a frame; only what would end the attribute or begin a tag is escaped."""
+    from markupsafe import Markup
+
+    return Markup(page.replace("&", "&amp;").replace('"', "&#34;").replace("<", "&lt;"))
 
 
 def tone(state: str) -> str:

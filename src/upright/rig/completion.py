@@ -17,7 +17,7 @@ from upright.rig.rig import Rig
 
 def completed(
     rig: Rig, entries: Mapping[str, Entry | None] | None = None, *, vendor: str | None = None,
-    needs: Collection[str] = ("limit", "servo_period", "counts"), who: str = "a simulation", form: str = "--{} {}",
+    needs: Collection[str] = ("limit", "servo_period", "counts"), who: str = "a simulation", options: bool = True,
 ) -> Rig:  # fmt: skip
     """A rig with what is known of its drive, encoders and servo: what a call gives, its own, the data sheet named.
 
@@ -34,8 +34,8 @@ def completed(
         What may not be missing; ``"counts"`` is those of every encoder.
     who : str
         Verb that asks.
-    form : str
-        How its caller gives a number by name; empty where only files say it.
+    options : bool
+        Whether its caller has an option for each number; otherwise only files have them.
 
     Raises
     ------
@@ -46,11 +46,10 @@ def completed(
     hardware = replace(rig.hardware, vendor=chosen).with_entries(entries or {})
     if chosen:
         hardware = hardware.over(sheet(chosen, rig.plant, rig.unit))
-    counts = {f"counts.{c.name}": form.format("counts", 4096) for c in rig.plant.coordinates}
-    options = {"limit": "10", "servo_period": '"2 ms"', "travel": "0.2"}
-    options = {n: form.format(n.removeprefix("servo_"), value) for n, value in options.items()}
-    wanted = {n: w for n, w in options.items() if n in needs} | (counts if "counts" in needs else {})
-    hardware.demand(wanted, who, sheet=form.format("vendor", "NAME") or 'vendor = "NAME" in RIG.toml')
+    needed = {"limit": "--limit 10", "servo_period": '--period "2 ms"', "travel": "--travel 0.2"}
+    needed |= {f"counts.{c.name}": "--counts 4096" for c in rig.plant.coordinates}
+    wanted = {n: option if options else "" for n, option in needed.items() if n.partition(".")[0] in needs}
+    hardware.demand(wanted, who, sheet="--vendor NAME" if options else 'vendor = "NAME" in RIG.toml')
     if "delay" not in hardware.entries and "servo_period" in hardware.entries:
         late = Entry(value=hardware.entries["servo_period"].value, unit="s", source="assumed: one servo period")
         hardware = hardware.with_entries({"delay": late})

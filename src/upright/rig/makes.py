@@ -235,7 +235,7 @@ NOMINAL = cast("Furuta", MAKES["furuta"].rig.plant).replace(b_1=6e-4, b_1c=1.5e-
 def make_named(key: str | None, *, option: str = "--rig") -> Make:
     """Make that an option of the command line names; `BadInput` where there is none."""
     if key is None or key not in MAKES:
-        raise BadInput(f"{option} is one of {', '.join(MAKES)}, got '{key}'; {nearest(key or '', MAKES)}")
+        raise BadInput(f"{option} names a rig model, and '{key}' is none; {nearest(key or '', MAKES)}")
     return MAKES[key]
 
 
@@ -244,7 +244,7 @@ def make_of(plant: Plant, refusal: str = "") -> Make:
     for make in MAKES.values():
         if isinstance(plant, type(make.rig.plant)):
             return make
-    raise BadInput(refusal or f"none of the makes {', '.join(MAKES)} is a {type(plant).__name__}.")
+    raise BadInput(refusal or f"none of the rig models {', '.join(MAKES)} is a {type(plant).__name__}.")
 
 
 def make_of_rig(rig: Rig) -> Make:
@@ -257,7 +257,7 @@ def make_of_rig(rig: Rig) -> Make:
     """
     return make_of(
         rig.plant,
-        f"none of the makes {', '.join(MAKES)} is a '{rig.name}'; its drive and encoders are not known, so design "
+        f"none of the rig models {', '.join(MAKES)} is a '{rig.name}'; its drive and encoders are not known, so design "
         "for it (upright design) and simulate with up.simulate.",
     )
 
@@ -298,7 +298,7 @@ def make_rig(key: str, seed: int = 0) -> Rig:
         When there is no such make.
     """
     if key not in MAKES:
-        raise BadInput(f"there is no make '{key}'; take one of {', '.join(MAKES)}.")
+        raise BadInput(f"there is no rig model '{key}'; take one of {', '.join(MAKES)}.")
     make = MAKES[key]
     rig = make.rig
     if not seed:

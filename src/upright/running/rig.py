@@ -38,7 +38,7 @@ def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
         model, truth = make_rig(make.key), make_rig(make.key, file.seed)
         return (replace(model, name=file.name), truth) if file.name else (model, truth)
     known = read_stored_rig(file.known, seed=file.seed)
-    model = _corrected(completed(known, vendor=file.vendor, who="a run on a rig", form=""), file)
+    model = _corrected(completed(known, vendor=file.vendor, who="a run on a rig", options=False), file)
     truth = model
     if file.performed == SIMULATED and file.make:
         truth = make_rig(make_named(file.make, option="make").key, file.seed)

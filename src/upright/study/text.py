@@ -20,6 +20,8 @@ from upright.errors import BadInput, UprightError, nearest
 from upright.files import read_text
 
 _LEAST = 1e-60
+LOGS = (".csv", ".tsv", ".txt", ".dat", ".mat", ".mcap")
+"""Endings of files that are no study."""
 SOURCES = ("assumed", "measured")
 """Source of a known number, as in ``{ value = "10 V", measured = true }``."""
 KeyPath = tuple[str | int, ...]
@@ -50,9 +52,14 @@ class StudyText:
             at = re.search(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)", message)
             line = at.group(1) if at and at.group(1) else self.text.count("\n") + 1
             what = re.sub(r"\s*\(at .*\)$", "", message)
+            if path.suffix.lower() in LOGS:
+                raise BadInput(
+                    f"{path} is a log, and what is needed here is a study or a fit. To make a study of it: "
+                    f"upright init {path} -o {path.stem}.toml"
+                ) from None
             raise BadInput(
                 f"{path}, line {line}: this is not TOML ({what[:1].lower()}{what[1:]}). Write text in quotes, as in"
-                ' plant = "furuta", and each key on its own line. If this is a log: upright init LOG'
+                ' plant = "furuta", and each key on its own line. To make a study of a log: upright init LOG'
             ) from None
         except (ValueError, RecursionError):  # a number of 5000 digits, a list in 1000 lists
             raise BadInput(

@@ -50,7 +50,7 @@ class Answer(Generic[V]):
         return getattr(self.value, name)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(n for n in dir(self.value) if not n.startswith("_"))})
+        return sorted(n for n in {*super().__dir__(), *dir(self.value)} - {"brief"} if not n.startswith("_"))
 
     @property
     def numbers(self) -> Any:

@@ -362,7 +362,9 @@ def survey(
     if isinstance(file, str | os.PathLike):
         file = Path(file)
         if not file.exists():
-            raise BadInput(f"the sheet {file} does not exist; check the path.")
+            from upright.readers.source import neighbour
+
+            raise BadInput(f"There is no file '{file}';{neighbour(file)}")
         sheet, name, command = read_sheet(file, scale=limits), file.name, f"upright survey {typed(file)}"
     elif hasattr(file, "to_csv") and hasattr(file, "iloc"):
         sheet, name, command = read_table(file.to_csv(index=bool(file.index.name)), "frame", scale=limits), "frame", ""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from upright.errors import BadInput
 from upright.files import keeps_its_inputs, replace_file
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
@@ -20,6 +21,7 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 @command(
     name="firmware build",
     metavars=_METAVARS,
+    defaults={"out": "upright-firmware"},
     more="""
     upright firmware build --drive pair
     upright firmware build --drive pair --rig RIG.toml     ceilings that no host can widen: the rig's own limits
@@ -29,7 +31,7 @@ _METAVARS = {"board": "NAME", "drive": "NAME", "rig": "RIG.toml", "port": "PORT"
 @keeps_its_inputs
 def firmware_build(
     *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
-    brake: float | str | None = None, out: PathLike = "upright-firmware",
+    brake: float | str | None = None, out: PathLike | None = None,
 ) -> Answer[Image]:  # fmt: skip
     """Make the image that goes onto a board.
 
@@ -48,7 +50,7 @@ def firmware_build(
         For how long a stop leaves the bridge on with both lines low, so that it shorts the motor, ``"0.3 s"``; 1 s at
         most. For a BTS7960 (``"pair"``); without it the rig coasts.
     out : path
-        Folder for the image.
+        Folder for the image; a command's is upright-firmware when omitted.
 
     Returns
     -------
@@ -63,6 +65,8 @@ def firmware_build(
     from upright.report.page import Chapter, Facts, Part
     from upright.rigs.firmware import board_of, build_image, ceilings_in_words
 
+    if out is None:
+        raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
     image = build_image(made, drive, Path(out), _ceilings(rig, brake, drive))
     whence = "As it comes with this package." if image.ready else "Built here."
@@ -81,6 +85,7 @@ def firmware_build(
 @command(
     name="firmware flash",
     metavars=_METAVARS,
+    defaults={"out": "upright-firmware"},
     more="""
     With the motor's supply off.
 
@@ -89,7 +94,7 @@ def firmware_build(
 )
 def firmware_flash(
     *, board: str = "mega", drive: str = "analog", rig: PathLike | None = None,
-    brake: float | str | None = None, port: str | None = None, out: PathLike = "upright-firmware",
+    brake: float | str | None = None, port: str | None = None, out: PathLike | None = None,
     hand: Callable[[str], bool] = lambda _: True,
 ) -> Answer[Flashed]:  # fmt: skip
     """Build the image, write it to a board once you agree, and verify it.
@@ -107,7 +112,7 @@ def firmware_flash(
     port : str, optional
         Where the board is; found where it is left out.
     out : path
-        Folder for the image.
+        Folder for the image; a command's is upright-firmware when omitted.
     hand : callable, optional
         Asked before anything is written.
 
@@ -126,6 +131,8 @@ def firmware_flash(
     from upright.report.page import Chapter
     from upright.rigs.firmware import board_of, build_image, flash
 
+    if out is None:
+        raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
     image = build_image(made, drive, Path(out), _ceilings(rig, brake, drive))
     flashed = flash(made, image.path, port or "", hand=hand)
@@ -185,7 +192,6 @@ def firmware_pins(
 
 def _ceilings(rig: PathLike | None, brake: float | str | None, drive: str) -> dict[str, int]:
     """A rig's own limits, and for how long it brakes [ticks], as its board can be compiled for them."""
-    from upright.errors import BadInput
     from upright.rigs.firmware.boards import PAIR
     from upright.verbs.values import si_if_given
 
@@ -201,7 +207,6 @@ def _ceilings(rig: PathLike | None, brake: float | str | None, drive: str) -> di
 
 
 def _limits(path: Path) -> dict[str, int]:
-    from upright.errors import BadInput
     from upright.rigs.driver import FULL_SCALE
     from upright.rigs.firmware import ceilings_of
     from upright.rigs.rigfile import read_rig_file

@@ -66,6 +66,10 @@ def fitted_of(source: Any, verb: str) -> StoredFit:
         return source
     if isinstance(source, FitAnswer):
         return source.fitted
+    if not (isinstance(source, str | os.PathLike | type) or _written(source)):
+        raise BadInput(
+            f"{verb} takes what up.identify answered, a fit.json or its folder, got {type(source).__name__}."
+        )
     path = _file(source, verb)
     return read_fit(path / SAVED if path.is_dir() else path)
 

@@ -17,7 +17,7 @@ _OPTION = re.compile(r"(?<![\w-])(--?[a-z][a-z-]*)(?: (\"[^\"]*\"|\d[\d.]*\b|[A-
 
 
 def worded_for_python(verb: V) -> V:
-    """The verb, its errors worded for Python."""
+    """The verb or method, its errors worded for Python."""
 
     @wraps(verb)
     def called(*args: Any, **words: Any) -> Any:
@@ -28,7 +28,6 @@ def worded_for_python(verb: V) -> V:
             error.args = tuple(worded(a, command) if isinstance(a, str) else a for a in error.args)
             raise
 
-    called.__module__, called.__qualname__ = "upright", verb.__name__  # where pickle finds it
     return called  # type: ignore[return-value]
 
 

@@ -265,7 +265,9 @@ def _file(log: Log) -> Path | None:
         return None
     path = Path(log)
     if not path.exists():
-        raise BadInput(f"the log {path} does not exist; check the path")
+        from upright.readers.source import neighbour
+
+        raise BadInput(f"There is no file '{path}';{neighbour(path)}")
     regular(path)
     return path
 

@@ -264,7 +264,7 @@ def _start(names: Sequence[str], units: Sequence[str], point: Mapping[str, float
     deviations: Mapping[str, Any] = start
     for name, value in deviations.items():
         if name not in names:
-            raise BadInput(f"start names states, got '{name}'; {nearest(name, names)} (they are {', '.join(names)})")
+            raise BadInput(f"start names states, got '{name}'; {nearest(name, names)}")
         i = names.index(name)
         x[i] += si(value, units[i])
     return x

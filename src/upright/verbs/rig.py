@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         "reference": 'Signal that the law follows: "square 0.3 8".',
         "duration": "Length of the run.",
     },
+    defaults={"out": "upright-run"},
     wrong=lambda answer: not answer.value.sound,  # whether it ran, whatever its model is worth
     more="""
     Space, q, Esc or Ctrl-C stop it; the command goes to zero first.
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 def run(
     rig: PathLike, *, law: PathLike | None = None, excite: str | None = None,
     duration: float = 30.0, check: bool = True, watch: bool = True,
-    out: PathLike = "upright-run", pdf: bool = False,
+    out: PathLike | None = None, pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "", **on: Unpack[RunOptions],
 ) -> Answer[RigRun]:  # fmt: skip
     """Run a law or a signal on a rig, supervised and logged, and evaluate the run.
@@ -97,7 +98,15 @@ def run(
     from upright.running.chapter import run_chapter
     from upright.running.run import RunRequest, run_rig
 
+    if out is None:
+        raise BadInput("the log of a run is kept: name a folder for it, such as out='runs'.")
     folder, on = page_folder(out, pdf), known_options(RunOptions, on, "run")
+    if not path_of(rig, "the rig that runs").exists():
+        from upright.readers.source import neighbour
+
+        raise BadInput(
+            f"There is no file '{rig}';{neighbour(Path(rig))} docs/howto/rigs.md says what a RIG.toml holds."
+        )
     leaning = _let_go(on.get("start"), path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.experiments.free_swing_4.chapter import chapter
-from upright.experiments.free_swing_4.figures import drift_figure, energy_figure
+from upright.experiments.free_swing_4.figures import drift_figure, energy_figure, frames_figure
 from upright.experiments.free_swing_4.release import DriftPath, freed
 from upright.experiments.free_swing_4.run import EnergyBalance, FreeSwing
 from upright.rig.makes import make_rig
@@ -100,3 +100,41 @@ def test_the_chapter_s_table_of_drift_is_in_degrees_or_centimetres(make, rows, u
     (balance,) = [b for b in told.parts[1].content if hasattr(b, "draw")]
     assert balance.description == "At the end: viscous friction 12.3 mJ."
     assert told.numbers["drift"]["pushed"] == {"slope": pytest.approx(0.2), "end": 0.6}
+
+
+def test_frames_are_right_handed_and_turned_by_the_angles_that_are_drawn():
+    """Where axis i points along s z, s = +-1, of a page with x to the right and y up, the next two are i x j = k."""
+    above, outside = frames_figure().axes
+    for ax, out, fixed, turned, first, second, name in (
+        (above, -1, "n", "a", 2, 3, "psi"),  # axis 1 into the page, (-z) x 2 = 3
+        (outside, 1, "a", "b", 1, 3, "theta"),  # axis 2 out of it, 3 = 1 x z
+    ):
+        arrows = {}
+        labels = [t for t in ax.texts if t.get_text().startswith(r"$\mathbf")]
+        for arrow, label in zip([t for t in ax.texts if not t.get_text()], labels, strict=True):
+            along = np.subtract(arrow.xy, arrow.xyann)
+            letter, axis = label.get_text()[9], int(label.get_text()[-2])
+            arrows[letter, axis] = along
+            ahead = np.subtract(label.get_position(), arrow.xy)
+            assert along[0] * ahead[1] - along[1] * ahead[0] == pytest.approx(0.0, abs=1e-12)
+            assert along @ ahead > 0  # its name stands beyond its tip
+        assert len(arrows) == 4
+        assert {round(float(np.hypot(*v)), 9) for v in arrows.values()} == {0.55}
+        for letter in (fixed, turned):
+            x, y = arrows[letter, first]
+            # s z x (x, y) = s (-y, x); (x, y) x s z = s (y, -x)
+            wanted = (y, -x) if first == 1 else (out * -y, out * x)
+            assert arrows[letter, second] == pytest.approx(wanted, abs=1e-12)
+        where, to = (np.arctan2(*arrows[letter, first][::-1]) for letter in (fixed, turned))
+        arc = max(ax.lines, key=lambda line: len(line.get_xdata()))
+        radius, angle = np.hypot(*arc.get_data()), np.arctan2(*arc.get_data()[::-1])
+        np.testing.assert_allclose(radius, radius[0])
+        assert np.degrees([to - where, angle[-1] - angle[0]]) == pytest.approx([out * 35, out * 35])
+        assert (angle[0], angle[-1]) == pytest.approx((where, to))
+        (bar,) = [line for line in ax.lines if line.get_linewidth() == 6]
+        ((x0, x1), (y0, y1)) = bar.get_data()
+        assert (x0, y0) == (0.0, 0.0)
+        assert np.arctan2(y1, x1) == pytest.approx(to)  # the arm lies along its axis 2, the rod along its axis 1
+        assert any(t.get_text() == rf"$\{name}$" for t in ax.texts)
+    (mass,) = [line for line in outside.lines if line.get_marker() == "o"]
+    assert 0 < np.hypot(*np.ravel(mass.get_data())) < 1.5  # within the rod

@@ -302,7 +302,8 @@ def test_errors_stated_are_those_of_repeats():
     assert 0.35 < np.sqrt(np.mean(z**2)) < 1.9
 
 
-def test_a_response_travels(tmp_path):
+@pytest.mark.parametrize("heard", [0, 1, 3])
+def test_a_response_travels(tmp_path, heard):
     rng = np.random.default_rng(0)
     F, n = 5, 2
     data = FrequencyResponse(
@@ -310,10 +311,11 @@ def test_a_response_travels(tmp_path):
         outputs=("psi", "theta"), units=("rad", "rad", "V"), input="volts", variance=rng.random((F, n)),
         coherence=rng.random((F, n)), distortion=rng.random((F, n)), still=rng.random((F, n)),
         drive=rng.normal(size=F) + 1j, dry=rng.normal(size=(F, n)) + 2j, hold=1e-3, notes=("said",),
+        **({"overtones": rng.normal(size=(F, n, heard)) + 3j} if heard else {}),
     )  # fmt: skip
     data.to_csv(tmp_path / "r.csv")
     back = FrequencyResponse.from_csv(tmp_path / "r.csv")
-    for name in ("omega", "response", "variance", "coherence", "distortion", "still", "drive", "dry"):
+    for name in ("omega", "response", "variance", "coherence", "distortion", "still", "drive", "dry", "overtones"):
         assert np.array_equal(getattr(back, name), getattr(data, name))
     assert (back.outputs, back.units, back.input, back.notes, back.hold) == (
         data.outputs, data.units, data.input, data.notes, data.hold,

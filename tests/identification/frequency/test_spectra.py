@@ -120,8 +120,12 @@ def test_a_log_in_which_nothing_is_asked_is_refused() -> None:
     noise = np.random.default_rng(0).normal(size=3000)
     with pytest.raises(NotIdentifiable, match="no sine of three periods"):
         told(record(np.where(np.arange(3000) == 5, 1.0, 0.0), noise), kind="sines")
-    with pytest.raises(NotIdentifiable, match="repeats three times"):
-        told(record(noise, noise), kind="multisine")
+    for command in (noise, np.tile(noise[:1000], 2)):
+        with pytest.raises(NotIdentifiable, match="repeats three times"):
+            told(record(command, command), kind="multisine")
+    thrice = np.tile(noise[:1000], 3)
+    every = told(record(thrice, thrice), kind="multisine")
+    assert not every.distortion.any()  # no odd line is left to see any on
 
 
 LENGTH = 500
@@ -140,6 +144,13 @@ def periodic(periods: int = 8, noise: float = 0.0, drift: float = 0.0, extra: fl
     y += noise * np.random.default_rng(4).normal(size=k.size) + drift * k * DT
     y += extra * np.cos(2 * math.pi * 7 * k / LENGTH)
     return record(u, y), answer
+
+
+@pytest.mark.parametrize(("size", "lines"), [(0.019, [3, 7, 11]), (0.021, [3, 7, 11, 30])])
+def test_a_line_of_a_hundredth_of_the_largest_is_asked_for(size: float, lines: list[int]) -> None:
+    phase = 2 * math.pi * np.arange(4 * LENGTH) / LENGTH
+    u = np.cos(3 * phase) + 2 * np.sin(7 * phase) + np.sin(11 * phase) + size * np.sin(30 * phase)
+    assert told(record(u, u), kind="multisine").omega == pytest.approx(2 * math.pi * np.array(lines) / (LENGTH * DT))
 
 
 @pytest.mark.parametrize("kind", [None, "multisine"])

@@ -177,7 +177,7 @@ def test_a_prediction_is_told_beside_a_held_speed_and_a_black_box() -> None:
     told = predicts(fitted, ("b", score("predict", theta=90.0, theta_naive=-40.0, theta_black=92.0)))
     assert told.headline == (
         "It explains 99.0 % of the fitted runs. It predicts 90.0 % of runs it has not seen "
-        "(holding the measured speed: 0.0 %; an equation without physics: 92.0 %)."
+        "(holding the measured speed: 0.0 %; black-box (ARX) baseline: 92.0 %)."
     )
     assert told.reasons == ()
     beaten = predicts(fitted, ("b", score("predict", theta=90.0, theta_black=92.1)))

@@ -141,6 +141,14 @@ def test_friction_of_each_run_is_offered_only_where_there_are_runs_and_friction(
 
 
 @pytest.mark.parametrize(
+    ("friction", "offered"), [({}, False), ({"b_2": 0.0}, False), ({"b_2": 1e-3}, True), ({"b_2c": 1e-3}, True)]
+)
+def test_friction_that_is_known_may_differ_from_run_to_run_too_unless_it_is_none(friction, offered):
+    known = rig(Pendulum, PENDULUM | {"b_2": 0.0, "b_2c": 0.0, "b_2q": 0.0} | friction, {"J_p": 1.4e-3})
+    assert ("friction of each run" in [r.name for r in default_rungs(known, PLAIN)]) is offered
+
+
+@pytest.mark.parametrize(
     ("levels_of", "offered"),
     [
         (({}, {}), True),

@@ -55,11 +55,11 @@ def test_a_plant_that_leaves_half_of_more_than_a_tenth_is_taken_instead(told, ow
     theirs, ours = f"torsional-2 {100 * best:.0f} %", f"furuta {100 * own:.0f} %"
     assert instead == ("torsional-2" if better else "")
     assert said == (
-        f"Taken for torsional-2. Of the accelerations it explains {100 * best:.0f} %, {ours}, double-pendulum was not "
-        "tried: --plant says which."
+        f"Taken for torsional-2. It explains {100 * best:.0f} % of the accelerations, {ours}, double-pendulum was not "
+        "tried; choose with --plant."
         if better
-        else f"Taken for furuta by its columns. Of the accelerations it explains {100 * own:.0f} %, {theirs}, "
-        "double-pendulum was not tried: --plant says which."
+        else f"Taken for furuta by its columns. It explains {100 * own:.0f} % of the accelerations, {theirs}, "
+        "double-pendulum was not tried; choose with --plant."
     )
 
 
@@ -67,7 +67,7 @@ def test_columns_called_as_the_coordinates_are_believed_and_the_better_plant_is_
     named = {name: replace(c, name=f"{name} [rad]") for name, c in COLUMNS.items()}
     instead, (said,) = told({"furuta": 0.3, "torsional-2": 0.97}, named)
     assert instead == ""
-    assert said.startswith("Taken for furuta by its columns. Of the accelerations it explains 30 %, torsional-2 97 %,")
+    assert said.startswith("Taken for furuta by its columns. It explains 30 % of the accelerations, torsional-2 97 %,")
     assert said.endswith("--plant torsional-2 drafts what explains them far better.")
 
 
@@ -78,14 +78,14 @@ def test_a_plant_that_its_columns_could_only_be_of_is_not_compared(told):
 
 
 def test_where_nothing_can_be_explained_the_columns_are_all_there_is(told):
-    by_columns = ["Taken for furuta; the columns could be of torsional-2 or double-pendulum: --plant says which."]
+    by_columns = ["Taken for furuta; the columns also suit torsional-2 or double-pendulum; choose with --plant."]
     assert told({}) == ("", by_columns)
     assert told({"torsional-2": 0.9}) == ("", by_columns)
     counted = {name: replace(c, guess="counts") for name, c in COLUMNS.items()}
     assert told({"furuta": 0.9, "torsional-2": 0.95}, counted) == ("", by_columns)
     assert told({"furuta": 0.9}, counted, plant="rectilinear-2") == ("", [])  # carts from disks they never tell
     _, (only,) = told({}, doubts=("torsional-2 looks the same",))
-    assert only == "Taken for furuta; the columns could be of double-pendulum: --plant says which."
+    assert only == "Taken for furuta; the columns also suit double-pendulum; choose with --plant."
     assert told({}, doubts=("torsional-2 or double-pendulum",)) == ("", [])
 
 

@@ -186,6 +186,21 @@ def test_a_loop_that_lives_on_is_told_from_a_dead_drive(log, dead, tmp_path):
     assert ("no longer moves the bodies" in text) == dead
 
 
+@pytest.mark.real_data
+@pytest.mark.parametrize("day", ["14-Feb-2025 09_22_43", "14-Feb-2025 09_44_21", "21-Feb-2025 09_19_16"])
+def test_a_run_saved_as_text_and_as_matlab_drafts_one_study(day, tmp_path):
+    """But for the names of files and columns; in a closed loop the front end's text lacks the command."""
+    studies = []
+    for suffix in (".txt", ".mat"):
+        path = Path(os.environ["UPRIGHT_REAL_DATA"]) / "ecp210_rectilinear_ucsd_1khz" / (day + suffix)
+        record = read(path)
+        text = draft(record, inspect(record), path, tmp_path / "study.toml")
+        for theirs, ours in (("Encoder 1 Pos", "enc1"), ("Encoder 2 Pos", "enc2"), ("Control Effort", "target_v")):
+            text = text.replace(theirs, ours)
+        studies.append(text.replace(suffix, ""))
+    assert studies[0] == studies[1]
+
+
 REAL = {  # file: plant, held or locked, least fit percent of every signal
     "ecp205_torsional_ucsd/Jan141428.mat": ("torsional-2", ["theta_2"], 90),
     "ecp205_torsional_ucsd/Jan211520.mat": ("torsional-2", [], 90),

@@ -15,6 +15,7 @@ from upright.readers import inspect
 from upright.readers.inspection import Column, Inspection
 from upright.readers.resolution import Resolution
 from upright.records import Record
+from upright.simulation import simulate
 from upright.study.draft.recognise import (
     coupling,
     drive_column,
@@ -405,6 +406,18 @@ def test_the_first_motion_is_looked_for_within_two_seconds():
         x = np.zeros(50)
         x[k:] = -1
         assert moves_against(0.125 * np.arange(50), u, x) is against
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_cart_that_swings_back_when_its_first_command_comes_tells_the_sign_by_its_acceleration(sign):
+    """1 kg on 100 N/m, let go at -5 cm 0.3 s before: it moves against the push, and is accelerated along it."""
+    t = 0.005 * np.arange(1000)
+    u = np.where((t > 0.3) & (t % 3 < 1.5), 2.0, 0.0)
+    cart = find("rectilinear-1")(m_1=1.0, k_1=100.0, c_1=0.5)
+    x = simulate(cart, {}, [-0.05, 0.0], u, 0.005, samples=t.size)[:, 0, 0]
+    begins = int(np.argmax(u > 0))
+    assert x[begins + 20] < x[begins]
+    assert moves_against(t, u, sign * x) is (sign < 0)
 
 
 def triangle(crossings: int, half: float, dt: float = 0.01) -> tuple[np.ndarray, np.ndarray]:

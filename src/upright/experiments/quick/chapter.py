@@ -106,8 +106,9 @@ def _fit_part(result: QuickRun) -> Part:
 def _gains_part(result: QuickRun) -> Part:
     law, model = result.law, result.model
     assert law is not None and model is not None
-    states = zip(model.states, model.state_units, law.K.tolist(), strict=True)
-    rows = tuple((name, number(-k, 4), raised(f"({model.unit})/({unit})")) for name, unit, k in states)
+    units = [f"({unit})" if "/" in unit else unit for unit in model.state_units]
+    states = zip(model.states, units, law.K.tolist(), strict=True)
+    rows = tuple((name, number(-k, 4), raised(f"{model.unit}/{unit}")) for name, unit, k in states)
     content: tuple[Block, ...] = (
         Table(caption="State feedback about upright: the command for a unit of each state",
               headings=("state", "gain", "unit"), rows=rows, numbers=(1,)),

@@ -127,7 +127,7 @@ def run_quick(
         raise KeyboardInterrupt
     described = stand.described_by(folder / "fit.json", folder)
     known = read_stored_rig(folder / "fit.json", seed=seed)
-    model = completed(known, vendor=stand.vendor, who="a minute at a rig", form="").replace(name=stand.rig.name)
+    model = completed(known, vendor=stand.vendor, who="a minute at a rig", options=False).replace(name=stand.rig.name)
     progress("designing", 0.8)
     try:
         law = design_swing_up(model, travel=stand.travel, speeds=stand.speeds, seed=seed)

@@ -183,7 +183,7 @@ def _rank(a: Attempt) -> tuple[float, ...]:
 def identify_make(key: str, seed: int, folder: Path, progress: Progress = silent, draws: int = DRAWS) -> Rig:
     """What experiment 1b makes of a rig of the make; its logs and `fit.json` go into the folder."""
     if key not in PENDULUMS:
-        raise BadInput(f"there is nothing to hold upright on the make '{key}'; take one of {', '.join(PENDULUMS)}.")
+        raise BadInput(f"there is no pendulum to hold upright on a '{key}'; take one of {', '.join(PENDULUMS)}.")
     run_frequency(key, seed, folder, progress)
     return read_stored_rig(folder / "fit.json", seed=seed, draws=draws)
 

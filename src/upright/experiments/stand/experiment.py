@@ -53,7 +53,7 @@ class ExperimentInput:
     def identified(self, stand: TestStand) -> tuple[Rig, Rig]:
         """The rig of that fit, as it was identified and completed for a run; called as its owner calls it."""
         known = read_stored_rig(self.fit, seed=self.seed)
-        model = completed(known, vendor=stand.vendor, who="an experiment", form="")
+        model = completed(known, vendor=stand.vendor, who="an experiment", options=False)
         return known, model.replace(name=stand.rig.name)
 
     def estimated(self, key: str, name: str) -> tuple[Known, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,7 +42,11 @@ class TwinStand(TestStand):
             rig = rig.changed(a_1=rig.plant.parameters()["a_1"] + bolted)
         x0 = rig.plant.state(self.resting)
         x0[-2] += lifted
-        x = simulate(rig.plant, rig.drive, x0, u[:-1], rig.period, samples=u.size, substeps=SUBSTEPS)[:, :, 0]
+        before = math.ceil(rig.delay / rig.period) + 1 if u[0] and not lifted else 0  # samples at rest, as on a board
+        put_out = np.concatenate([np.zeros(before), u[:-1]])
+        x = simulate(
+            rig.plant, rig.drive, x0, put_out, rig.period, samples=put_out.size + 1, substeps=SUBSTEPS
+        )[before:, :, 0]  # fmt: skip
         log = logged(rig, np.arange(u.size, dtype=np.float64) * rig.period, x, u)
         record = log.replace(
             signals={n if n != "u" else APPLIED: v for n, v in log.signals.items()},

@@ -340,7 +340,7 @@ def multisine_response(
 
 
 def _lines(U: Complex) -> NDArray[np.int64]:
-    """Those at which a command asks."""
+    """Those at which a command asks: of more than a hundredth of its largest one's size."""
     size = np.abs(U.mean(axis=0))
     size[0] = 0.0
     return np.flatnonzero(size > 1e-2 * size.max())
@@ -372,11 +372,12 @@ def _level(y: Array) -> Array:
 def _between(mean: Complex, lines: NDArray[np.int64]) -> Array:
     """What stands on odd lines not excited, as root of its power near each line over the line's own size.
 
-    Dry friction and geometry are odd: as much of them stands on the lines that were excited.
+    Dry friction and geometry are odd: as much of them stands on the lines that were excited. Where every odd line was,
+    none of it shows.
     """
-    others = np.arange(mean.shape[0]) % 2 == 1
-    others[lines] = False
-    where = np.flatnonzero(others)
+    where = np.setdiff1d(np.arange(1, mean.shape[0], 2), lines)
+    if not where.size:
+        return np.zeros((lines.size, mean.shape[1]))
     power = np.abs(mean) ** 2
     near = np.array([power[where[np.argsort(np.abs(where - k))[:4]]].mean(axis=0) for k in lines])
     return np.sqrt(near) / np.maximum(np.abs(mean[lines]), 1e-300)

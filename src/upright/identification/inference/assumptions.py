@@ -257,7 +257,7 @@ def _without(
     out: dict[str, Estimate] = {}
     for n, share in follows.items():
         power = per_length(problem.rig.parameters[n].unit, force) if abs(share - 1) < NEGLIGIBLE else None
-        if power is None or n not in estimates:
+        if power is None:
             continue
         time, length = power
         factor = resolution**-length / assumed.value if resolution > 0 else 1.0 / assumed.value

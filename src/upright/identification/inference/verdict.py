@@ -477,7 +477,7 @@ def _beside(runs: Mapping[str, RunScore]) -> str:
     parts: list[str] = []
     for what, reached in (
         ("holding the measured speed", lambda s: s.naive),
-        ("an equation without physics", lambda s: s.black_box),
+        ("black-box (ARX) baseline", lambda s: s.black_box),
     ):
         percents = {
             f"{label} {n}": p for label, s in runs.items() if s.role == "predict" for n, p in reached(s).items()

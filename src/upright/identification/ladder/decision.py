@@ -143,7 +143,7 @@ def _stretch_gains(poorer: RunScore, richer: RunScore, quanta: Array) -> Array:
     here = _scored(poorer)
     n, free = here.stop - here.start, _free(poorer)
     rest = np.nan_to_num((poorer.y - poorer.simulated)[here][:, free])
-    dt = float(poorer.t[-1] - poorer.t[0]) / max(poorer.t.size - 1, 1)
+    dt = float(np.mean(np.diff(poorer.t)))
     # four memories long: what one stretch says is then news to a share of 3/4 or more
     pieces = int(np.clip(n * dt / max(4 * memory(rest, dt), dt), *STRETCHES))
     edges = here.start + np.linspace(0, n, pieces + 1).astype(int)

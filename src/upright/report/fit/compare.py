@@ -268,7 +268,7 @@ def _steps(compared: Comparison, beaten: list[str], differ: list[tuple[str, str]
     if beaten:
         return [
             Step(
-                f"Physics is missing where an equation without any does better: see what the residuals of "
+                f"Physics is missing where the black-box baseline does better: see what the residuals of "
                 f"{', '.join(beaten)} look like, and climb the ladder.",
                 "upright ladder STUDY.toml -o OUT",
             )

@@ -89,7 +89,7 @@ def ratio_table(fit: Fit) -> Table:
     """What the data tell whatever the assumed numbers are: ratios to them, and lumped values."""
     rows = [(n, e) for a in fit.assumptions for n, e in a.ratios.items()]
     return Table(
-        caption="What is known whatever the assumed numbers are; per gain in units of the command, seconds and counts",
+        caption="Combinations that do not depend on assumed numbers; per gain in units of the command, s and counts",
         headings=("quantity", *_ESTIMATE[:-1]), numbers=(1, 2, 3), badge=5,
         rows=tuple((plain(n), *_estimate(n, e, None)[:-1]) for n, e in rows),
     )  # fmt: skip
@@ -109,7 +109,7 @@ def run_table(fit: Fit) -> Table:
 def _estimate(name: str, e: Estimate, about: Parameter | None) -> tuple[str, ...]:
     beforehand = ", known beforehand" if about and about.uncertainty else ""
     value, error = with_error(e.value, e.stderr)
-    error = f"{error} with it" if e.given and error else error  # the assumed number, were it right
+    error = f"{error} (given it)" if e.given and error else error  # the assumed number, were it right
     return value, error, interval(e), unit(e.unit), f"{e.qualified}{_narrow(e)}", _called(name, about) + beforehand
 
 

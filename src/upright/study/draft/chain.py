@@ -156,11 +156,11 @@ def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTa
         body = int(tail[-1]) - 1 if (tail := name.rstrip("cqs"))[-1].isdigit() else -1
         inertia = name[:2] in ("m_", "J_")
         if inertia and stuck[body]:
-            table.key(name, assumed(value or 1.0, what.unit), f"{what.meaning}; held, so it does not matter")
+            table.key(name, assumed(start.numbers[name], what.unit), f"{what.meaning}; held, so it does not matter")
         elif inertia and not scaled:
             scaled = True
             why = "MEASURE: a free swing sees only ratios"
-            table.key(name, assumed(value or 1.0, what.unit), f"{what.meaning}; {why}")
+            table.key(name, assumed(start.numbers[name], what.unit), f"{what.meaning}; {why}")
         elif carts and name == "k_12" and driven and len(stuck) == 2 and stuck[1]:
             why = "MEASURE: with body 2 held, only k_1 + k_12 is seen"
             table.key(name, assumed(start.numbers["k_1"] / 2, what.unit), f"{what.meaning}; {why}")

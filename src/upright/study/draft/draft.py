@@ -57,8 +57,8 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
         rig.key("guessed", True, "the plant was not specified: take this out once you know it is this one")
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
-    head.line("# A number in quotes wears its unit; { guess = ... } asks for it; a plain text or number is known.")
-    head.line("# Lines marked MEASURE hold placeholders, which are assumed: no number that rests on one can be used.")
+    head.line("# Quantities are written with units. { guess = ... } is estimated; a text or number alone is known.")
+    head.line("# Lines marked MEASURE hold assumed placeholders: no estimate that depends on one can be used.")
     head.line('# Replace them by what you measured, as in m_p = "0.22 kg". All keys: `upright identify --keys`.')
     head.line(f"# {window_of(tables, record)}")
     for doubt in doubts:
@@ -105,7 +105,7 @@ def alike(record: Record, inspection: Inspection, recognised: Recognised) -> tup
     if not others or (counted and recognised.plant.startswith(CHAINS) and len(recognised.columns) > 1):
         return "", []
     head = f"Taken for {recognised.plant}"
-    by_columns = [f"{head}; the columns could be of {' or '.join(others)}: --plant says which."]
+    by_columns = [f"{head}; the columns also suit {' or '.join(others)}; choose with --plant."]
     if counted:
         return "", by_columns
     if record.t.size > LONGEST:
@@ -125,6 +125,6 @@ def alike(record: Record, inspection: Inspection, recognised: Recognised) -> tup
     taken, reason = (recognised.plant, " by its columns") if named or not better else (best, "")
     rest = [n for n in (recognised.plant, *others) if n != taken]
     shares_text = ", ".join(f"{n} {100 * shares[n]:.0f} %" if n in shares else f"{n} was not tried" for n in rest)
-    remedy = f"--plant {best} drafts what explains them far better" if better and named else "--plant says which"
-    sentence = f"Taken for {taken}{reason}. Of the accelerations it explains {100 * shares[taken]:.0f} %"
-    return "" if taken == recognised.plant else taken, [f"{sentence}, {shares_text}: {remedy}."]
+    remedy = f"--plant {best} drafts what explains them far better" if better and named else "choose with --plant"
+    sentence = f"Taken for {taken}{reason}. It explains {100 * shares[taken]:.0f} % of the accelerations"
+    return "" if taken == recognised.plant else taken, [f"{sentence}, {shares_text}; {remedy}."]

@@ -308,14 +308,13 @@ def zero_reading(
     x = record[c.name]
     if drive is not None:
         u = record[drive.name]
-        first = int(np.argmax(u != u[0]))
-        before = x[max(0, first - 50) : first]
+        before = x[: _commanded_from(u)]
         angle = c.guess in ANGLES
         begins = float(x[np.searchsorted(record.t, window[0])])
         if angle and anywhere:
             return begins
-        if u[0] == 0 and first >= 5 and not (hangs and not _starts_still(x, u)):
-            return float(np.median(before))
+        if before.size and not (hangs and not _starts_still(x, u)):
+            return float(np.median(before[-50:]))
         return rest_level(x, inspection, record.t) if angle else begins
     return rest_level(x, inspection, record.t)
 
@@ -326,8 +325,14 @@ STILL = 0.05
 
 def _starts_still(x: Array, u: Array) -> bool:
     """Whether a signal lies still before the first command; where it moves its place is no zero."""
+    before = x[: _commanded_from(u)]
+    return before.size > 0 and float(np.ptp(before)) <= STILL * float(np.ptp(x))
+
+
+def _commanded_from(u: Array) -> int:
+    """First sample with a command, 0 where less than five without one come before it."""
     first = int(np.argmax(u != u[0]))
-    return u[0] == 0 and first >= 5 and float(np.ptp(x[:first])) <= STILL * float(np.ptp(x))
+    return first if u[0] == 0 and first >= 5 else 0
 
 
 def rest_level(x: Array, inspection: Inspection, t: Array) -> float:
@@ -401,8 +406,6 @@ def _pushed(t: Array, u: Array, x: Array) -> float:
     push = savitzky_golay(np.interp(grid, t, u), step, width).q
     both = np.column_stack([push, motion.q, motion.v, np.sign(motion.v), np.ones_like(push)])[width:-width]
     a = motion.a[width:-width]
-    if not both[:, 0].any():
-        return 0.0
     pushed, alone = LeastSquares.of(both, a), LeastSquares.of(both[:, 1:], a)
     return float(pushed.slopes[0]) if pushed.squares < CLEAR * alone.squares else 0.0
 

@@ -260,7 +260,7 @@ def _period(x: Array, dt: float) -> float:
     """Period [s] in which a body's acceleration has most of its power."""
     shape = np.hanning(x.size)
     f = np.fft.rfftfreq(x.size, dt)
-    power = np.abs(np.fft.rfft((x - np.linspace(x[0], x[-1], x.size)) * shape)) ** 2
+    power = np.abs(np.fft.rfft((x - x.mean()) * shape)) ** 2
     power[(f > 1 / (8 * dt)) | (power < SURE**2 * white_noise(x) ** 2 * float(np.sum(shape**2)))] = 0.0
     return float(1 / f[max(int(np.argmax(power * f**4)), 1)])
 

@@ -18,7 +18,7 @@ from upright.study.windows import digits_within
 PLACES = (*ANGLES, *LENGTHS)
 EFFORTS = ("V", "A", "N", "N m")
 """Units of commands: a gain per mV would call a thousandth of it by the same number."""
-ROLES = {"fit": "fitted", "predict": "scored, never seen by the estimator"}
+ROLES = {"fit": "fitted", "predict": "scored, never fitted"}
 
 
 def rig_toml(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> TomlTable:

@@ -9,7 +9,7 @@ from upright.files import keeps_its_inputs
 from upright.verbs.command import command
 from upright.verbs.control.moving import Played, played, played_run
 from upright.verbs.handover import rig_of
-from upright.verbs.options import TrialOptions
+from upright.verbs.options import TrialOptions, known_options
 
 if TYPE_CHECKING:
     from upright.files import PathLike
@@ -70,5 +70,6 @@ def play(
         stored = fitted_of(fit, "play")
         label, score = next(iter(predict(stored, log).value.items()))
         return played_run(score, stored.rig().plant, label, out)
+    on = known_options(TrialOptions, on, "play")
     known = rig_of(fit, "play", seed=seed, draws=on.get("draws", 200))
     return played(known, poles=poles, seed=seed, out=out, **on)

@@ -10,7 +10,8 @@ from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.export.law import controller_of, write_law
 from upright.verbs.export.rig import write_rig
-from upright.verbs.pages import folder
+from upright.verbs.export.written import Exported
+from upright.verbs.pages import folder_if_given
 
 if TYPE_CHECKING:
     from upright.control.sensors import Scales
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     "Control",
     names={"single": "--float"},
     metavars={"source": "GAINS_OR_FIT", "to": "FORM"},
+    defaults={"out": "upright-export"},
     helps={
         "source": "design.json, swing_up.json or fit.json, or its folder.",
         "to": "A law as c, arduino, python, matlab or simulink; a rig as gymnasium, mjcf, fmu.",
@@ -39,8 +41,8 @@ if TYPE_CHECKING:
 @keeps_its_inputs
 def export(
     source: RigLike | Law | Rule | Answer[Designed] | Answer[SwingUpRun | Scales], *, to: str,
-    out: PathLike = "upright-export", single: bool = False, limit: float | None = None,
-) -> Answer[tuple[str, ...]]:  # fmt: skip
+    out: PathLike | None = None, single: bool = False, limit: float | None = None,
+) -> Exported:  # fmt: skip
     """Write a designed law as a program that tests itself, or an identified rig for other simulators.
 
     A law's program has sampling, differences or observer, limit and rounding in it. It repeats the commands of
@@ -55,8 +57,8 @@ def export(
         One of `upright.exports.targets.TARGETS`: of a law ``"c"``, ``"arduino"``, ``"python"``, ``"matlab"`` (GNU
         Octave too) or ``"simulink"``; of a rig ``"gymnasium"``, an environment whose every episode has another rig
         that the fit allows, ``"mjcf"``, a model of MuJoCo, or ``"fmu"``, a unit for co-simulation (FMI 3.0).
-    out : path
-        Folder for the files.
+    out : path, optional
+        Folder for the files; without one they are only in `contents`.
     single : bool
         Of a law, single precision (the command line's ``--float``); its commands miss by a converter's step at times.
         Not of a rule.
@@ -65,8 +67,8 @@ def export(
 
     Returns
     -------
-    Answer
-        Of the names of the files.
+    Exported
+        Of the names of the files; ``.contents["law.c"]`` is what is in one.
 
     Raises
     ------
@@ -75,16 +77,16 @@ def export(
     """
     from upright.exports.targets import TARGETS, LawTarget, RigTarget
 
-    to = str(to)
+    to, at = str(to), folder_if_given(out)
     if to not in TARGETS:
-        raise BadInput(f"--to is one of {', '.join(TARGETS)}, got '{to}'; {nearest(to, TARGETS)}")
+        raise BadInput(f"--to is the form to write, and there is no '{to}'; {nearest(to, TARGETS)}")
     target = TARGETS[to]
     if isinstance(target, LawTarget):
         if limit is not None:
             raise BadInput("the limit of a law is the one that it was designed with; give --limit to upright design.")
         made, name = controller_of(source)
-        return write_law(made, name, target, folder(out), single)
+        return write_law(made, name, target, at, single)
     if single:
         raise BadInput("--float is of laws; a rig is simulated in double precision.")
     assert isinstance(target, RigTarget)  # there are no others
-    return write_rig(source, target, folder(out), limit)
+    return write_rig(source, target, at, limit)

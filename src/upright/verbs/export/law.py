@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
-from upright.files import read_text, replace_file
+from upright.files import read_text
 from upright.verbs.answer import Answer
+from upright.verbs.export.written import Exported, written
 
 if TYPE_CHECKING:
     from upright.exports.controller import SampledController
@@ -57,7 +58,7 @@ def _of_content(content: Any, name: str) -> tuple[SampledController, str]:
     return (of_swing_up if swings else of_design)(content, name), name
 
 
-def write_law(made: SampledController, name: str, target: LawTarget, at: Path, single: bool) -> Answer[tuple[str, ...]]:
+def write_law(made: SampledController, name: str, target: LawTarget, at: Path | None, single: bool) -> Exported:
     """The law in one form, its files in a folder."""
     from upright.exports.targets import TARGETS, LawTarget
     from upright.exports.vector import self_test
@@ -73,7 +74,6 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
         )
     test = self_test(made)
     texts = target.write(made, test, single)
-    files = [replace_file(at / file, text.encode()) for file, text in texts.items()]
     unit, step = made.command_unit, float(made.converter.max(initial=0.0))
     warnings: list[str] = []
     if not math.isfinite(made.law.limit):
@@ -91,11 +91,12 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path, s
         title=f"{made.title} for {target.name}", verdict=f"{name} is written for {target.name}; {exact}.",
         parts=(Part("What it takes and gives", (Points(tuple(made.facts)),)),), warnings=tuple(warnings),
         steps=(
-            Step("Let it test itself where it will run.", target.test.format(folder=typed(at))), Step(target.onward)
+            Step("Let it test itself where it will run.", target.test.format(folder=typed(at or Path()))),
+            Step(target.onward),
         ),
         numbers={
-            "to": target.name, "files": [str(f) for f in files], "period": made.law.period, "limit": made.law.limit,
+            "period": made.law.period, "limit": made.law.limit,
             "samples": len(test.readings), "single_precision_misses": test.single,
         },
     )  # fmt: skip
-    return Answer(tuple(str(f) for f in files), resting_on(page, made.basis), files)
+    return written({n: text.encode() for n, text in texts.items()}, resting_on(page, made.basis), at, target.name)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput, nearest
 from upright.verbs.answer import Answer
+from upright.verbs.in_python import worded_for_python
 from upright.verbs.values import open_log
 
 if TYPE_CHECKING:
@@ -25,12 +26,28 @@ if TYPE_CHECKING:
 
 
 class FitAnswer(Answer["Fit"]):
-    """A fit, with its study.
+    """A fit: ``fit["l_cg"]`` is the estimate of a parameter, with its ``value``, ``stderr`` and ``interval``.
 
     Attributes
     ----------
+    verdict : str
+        Whether its numbers can be relied on, and for what.
+    trusted : bool
+    warnings : tuple of str
+    estimates : mapping of str to Estimate
+        All of them; `parameters` has them as a table.
+    runs : mapping of str to RunScore
+        How well each run is explained, with its measured and simulated signals.
+    chapter : Chapter
+        The whole report; `report` writes it.
+    files : tuple of Path
+        What was written.
     study : Study
+        Runs and model that it was made of.
+    value, fit : Fit
+        All that the search and the inference found.
     crossed : CrossValidation or None
+        Predictions of each run by a fit of the others, with ``hold_out="each"``.
     """
 
     def __init__(
@@ -38,6 +55,10 @@ class FitAnswer(Answer["Fit"]):
     ) -> None:
         super().__init__(fit, chapter, files)
         self.study, self.crossed = study, crossed
+
+    def __dir__(self) -> list[str]:
+        own = {n for n in vars(FitAnswer) | vars(Answer) | vars(self) if not n.startswith("_")}
+        return sorted({*own, "verdict", "trusted", "warnings", "estimates", "runs"} - {"brief", "fitted", "crossed"})
 
     def brief(self) -> Chapter:
         """Verdict, estimates and scores; the whole chapter is what `report` writes."""
@@ -80,6 +101,7 @@ class FitAnswer(Answer["Fit"]):
         """What is known of numbers that rest on assumed ones, per these: ``fit.ratios["b_2/m_p"]``."""
         return {n: e for a in self.value.assumptions for n, e in a.ratios.items()}
 
+    @worded_for_python
     def play(self, run: str = "", **options: Any) -> Played:
         """The identified rig, moving in a page, options as for `up.play`; or one of the `runs`, measured and simulated.
 
@@ -162,6 +184,7 @@ class FitAnswer(Answer["Fit"]):
         write_fit(self.value, self.study, path, self.crossed)
         return path
 
+    @worded_for_python
     def predict(self, other: Any, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
                 window: tuple[float, float] | None = None) -> Prediction:  # fmt: skip
         """How well the fit explains another log: a record, a data frame, a log's file, or a study.
@@ -214,6 +237,7 @@ class Prediction(Answer[PredictedRuns]):
         label = name or next(iter(self.value.runs))
         return fit_figure(_named(self.value.runs, label), type(self.value.plant), title=label)
 
+    @worded_for_python
     def play(self, run: str = "", *, out: str | Path | None = None) -> Played:
         """The first run, or the one called `run`, measured and simulated in a page with a slider of time."""
         from upright.verbs.control.moving import played_run

@@ -178,7 +178,7 @@ def identify(
 
     folder, shared = folder_if_given(out, pdf), Workers.of(workers)
     if method not in METHODS:
-        raise BadInput(f"--method must be one of {', '.join(METHODS)}, got '{method}'; {nearest(method, METHODS)}")
+        raise BadInput(f"--method is how to search, and there is no '{method}'; {nearest(method, METHODS)}")
     options = known_options(LogOptions, of_log, "identify")
     requested = requested_study(study, plant, verb="identify", data=data, **options)
     label = requested.path
@@ -283,12 +283,14 @@ def _is_study(path: Path) -> bool:
 
 def _read_study(study: Path, folder: Path, data: Path | None) -> Study:
     """A study, once study and folder of the results are what they should be."""
+    from upright.readers.source import neighbour
     from upright.report.symbols import typed
     from upright.study.load import load_study
 
     if not study.exists():
         raise BadInput(
-            f"the study {study} does not exist; `upright init LOG -o {typed(study.name)}` writes one from a log"
+            f"There is no study '{study}';{neighbour(study)} "
+            f"`upright init LOG -o {typed(study.name)}` writes one from a log"
         )
     if folder.exists() and not folder.is_dir():
         raise BadInput(f"results need a folder, but {folder} is a file; name another with -o")

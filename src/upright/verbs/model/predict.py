@@ -82,7 +82,7 @@ def predict(
     from upright.identification.inference.scoring import predict as score
     from upright.report.fit.chapter import score_pictures
     from upright.report.fit.tables import score_table
-    from upright.report.page import Chapter, Part
+    from upright.report.page import Chapter, Part, Step
     from upright.verbs.handover import called, fitted_of
 
     pdf_has_folder(out, pdf)
@@ -113,8 +113,15 @@ def predict(
         "runs": {label: {name: getattr(s, name) for name in names} for label, s in scores.items()},
     }
     offers = [s.offer.sentence(label, s.fit_percent) for label, s in scores.items() if s.offer is not None]
+    source, only_fitted = called(model), len(fitted_runs) == len(runs)
+    onward = (
+        Step("Predict a run that was not fitted.", f"upright predict {source} OTHER.csv") if only_fitted
+        else Step("Find gains for this model.", f"upright design {source}") if promised.holds
+        else Step("Look for faults of this log's sensors and drive.", f"upright doctor LOG --rig {source}")
+    )  # fmt: skip
     page = Chapter(
-        title=f"{of} on {on}", verdict=verdict, sound=promised.holds and len(fitted_runs) < len(runs), numbers=numbers,
+        title=f"{of} on {on}", verdict=verdict, sound=promised.holds and not only_fitted, numbers=numbers,
+        steps=(onward,),
         parts=(
             Part(
                 "How much of each signal is explained",
