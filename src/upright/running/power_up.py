@@ -40,7 +40,7 @@ PLAINLY = 10.0
 PATIENCE = 15.0
 """In which a person pushes the driven body to the end of its travel [s]."""
 
-ASKED_AGAIN = 3
+REMINDERS = 3
 """How often a person is asked to bring the driven body back who has left it off its start window."""
 
 PAUSE = threading.Event()
@@ -243,7 +243,7 @@ class FirstPowerUp:
     def _steadied(self, request: str = "Bring all to rest where it hangs, and take your hands away.") -> None:
         if self.hand is not None:
             self.hand(request)
-            for _ in range(ASKED_AGAIN):  # a board that is armed elsewhere latches a fault
+            for _ in range(REMINDERS):  # a board that is armed elsewhere latches a fault
                 tick, name = self.rig.exchange(0.0), self._driven_name
                 off = tick.counts[self.driven] / self.beside.about.counts[self.driven]
                 within, unit = self.beside.held.start[self.driven], self.model.plant.coordinates[self.driven].unit
