@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -25,7 +26,28 @@ def test_it_tells_the_share_that_chance_tells(written):
     gains = up.design(RIG, at="inverted", poles=POLES).continuous
     told = up.chance(RIG, gains, start="26 deg", seconds=3.0, draws=100)
     assert written[1].numbers["held"] == round(100 * told.numbers["chance"])
+    reach = re.fullmatch(r"It recovers from tilts up to (.*)° and taps up to (.*) rad/s\.", told.chapter.detail)
+    assert float(reach[1]) == pytest.approx(math.degrees(told.numbers["tilt"]), rel=0.05)  # two digits
+    assert float(reach[2]) == pytest.approx(told.numbers["push"], rel=0.05)
     assert 5 <= written[1].numbers["held"] <= 95
+
+
+def test_the_page_tells_the_numbers_of_the_rig_in_their_units(written):
+    rows = re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td><td[^>]*>(.*?)</td></tr>", written[0].read_text("utf-8"))
+    told = [(what, value) for _, what, value in rows]
+    assert ("gain of the drive [N m per V]", "0.6500") in told
+    assert ("limit of the drive [V]", "3.000") in told
+    assert ("servo period [ms]", "2.000") in told
+    assert [value for what, value in told if what == "encoder counts"] == ["4096", "4096"]
+    assert sum("friction" in what for what, _ in told) == sum(bool(v) for n, v in ARM.parameters().items() if "b" in n)
+
+
+def test_without_a_covariance_the_page_says_what_alone_varies(written, tmp_path):
+    blind = "The fit has no covariance: only dry friction and the hand vary."
+    assert blind in written[0].read_text("utf-8")
+    drawn = replace(RIG, draws=((RIG.plant, RIG.gain),) * 2)
+    up.play(drawn, poles=POLES, start="26 deg", draws=2, out=tmp_path / "play.html")
+    assert blind not in (tmp_path / "play.html").read_text("utf-8")
 
 
 def test_the_page_holds_no_address_and_evaluates_nothing(written):

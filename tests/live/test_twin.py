@@ -134,6 +134,18 @@ def test_rods_are_drawn_where_their_weight_is(name):
 
 
 @pytest.mark.parametrize("specimen", SPECIMENS.values(), ids=SPECIMENS)
+def test_every_part_of_a_drawing_keeps_its_lengths_wherever_it_moves(specimen):
+    plant = specimen.plant
+    if not type(plant).__module__.startswith("upright."):
+        return
+    rng, lengths = np.random.default_rng(3), list[np.ndarray]()
+    for q in (np.zeros(len(plant.coordinates)), *rng.uniform(-3, 3, (3, len(plant.coordinates)))):
+        lines = [np.array(points, dtype=float) for _, points in plant.outline(plant, q.tolist())]
+        lengths.append(np.concatenate([np.linalg.norm(np.diff(line, axis=0), axis=1) for line in lines]))
+    np.testing.assert_allclose(lengths, np.tile(lengths[0], (4, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("specimen", SPECIMENS.values(), ids=SPECIMENS)
 def test_every_shipped_plant_is_drawn(specimen):
     if type(specimen.plant).__module__.startswith("upright."):
         drawn = in_javascript(partial(specimen.plant.outline, specimen.plant), len(specimen.plant.coordinates))

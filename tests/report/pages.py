@@ -198,6 +198,15 @@ def swing_up_page(folder: Path) -> Chapter:
     return chapter(run_swing_up(make_rig("furuta"), TwinStand(rig=make_rig("furuta", 3)), folder, Rising()))
 
 
+def minute_page(folder: Path) -> Chapter:
+    from upright.experiments.quick.chapter import chapter
+    from upright.experiments.quick.run import run_quick
+    from upright.experiments.stand.live import live_stand
+
+    (folder / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\nseed = 3\n', encoding="utf-8")
+    return chapter(run_quick(live_stand(folder / "RIG.toml"), folder / "out"))
+
+
 def tracking_page(folder: Path) -> Chapter:
     from upright.experiments.tracking_3.chapter import chapter
     from upright.experiments.tracking_3.run import run_tracking

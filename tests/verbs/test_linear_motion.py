@@ -85,3 +85,10 @@ def test_a_command_stays_within_its_limit():
 def test_what_a_linear_model_cannot_do_is_said_in_a_sentence(call, sentence):
     with pytest.raises(up.BadInput, match=sentence):
         call()
+
+
+def test_an_output_that_feels_the_command_at_once_has_its_share_of_it():
+    """x' = -x + u under u = 1 is x = 1 - exp(-t), and the output 2 x + 3 u begins at 3."""
+    model = up.StateSpace([[-1.0]], [[1.0]], [[2.0]], [[3.0]], states=("x",), inputs=("u",), outputs=("y",))
+    record = up.simulate(model, u=1.0, seconds=2)
+    np.testing.assert_allclose(record["y"], 2 * (1 - np.exp(-record.t)) + 3, atol=1e-9)

@@ -29,6 +29,12 @@ def test_matrices_of_ssdata_are_a_continuous_model(tmp_path):
     np.testing.assert_allclose(sorted(model.poles().real), [-0.05 - np.sqrt(20.0025), -0.05 + np.sqrt(20.0025)])
 
 
+def test_matrices_without_a_period_are_a_continuous_model_whose_outputs_are_its_states(tmp_path):
+    model = up.from_matlab(saved(tmp_path / "m.mat", A=A, B=B))
+    assert model.dt is None
+    np.testing.assert_array_equal(model.C, np.eye(2))
+
+
 def test_a_structure_keeps_period_and_names(tmp_path):
     fields = {"A": A, "B": B, "C": C, "D": D, "Ts": 2e-3, "StateName": np.array(["theta", "theta_dot"], dtype=object)}
     rig, notes = fields | {"InputName": np.array(["v"], dtype=object)}, {"by": "somebody", "D": D}

@@ -101,6 +101,7 @@ def test_a_tilt_and_a_push_are_read_for_one_version_more():
     with pytest.deprecated_call(match="say start="):
         former = up.chance(RIG, K, tilt=0.1, push=0.4, draws=4)
     assert former.run.u.tolist() == now.run.u.tolist()
+    assert (now.value.margins, now.chapter.detail) == (None, "")  # what falls recovers from nothing
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,13 @@ def done(tmp_path_factory):
         "offset.theta": replace(Estimate.within(0.5, 0.1, 0.2), status="good", unit="rad"),
     }
     fit = SimpleNamespace(
-        estimates=estimates, model=SimpleNamespace(parameters={"J_d": None, "m_p": None}), trusted=True, verdict="Fits."
+        estimates=estimates,
+        model=SimpleNamespace(parameters={"J_d": None, "m_p": None}),
+        trusted=True,
+        verdict="Fits.",
+        interrupted=False,
+        failed=False,
+        answers=(),
     )
     return QuickRun(
         stand=stand, log=log, mode=mode, wiring=GOOD, seconds=23.4, model=RIG, fit=fit, law=LAW, share=0.75,
@@ -62,8 +68,8 @@ def test_a_pendulum_that_stands_is_said_to_after_how_long(done):
     assert done.upright
     page = chapter(done)
     weak = "Supply at half: the drive gives 0.52 ± 0.04 times its description."
-    assert page.verdict.endswith(f"Upright 2 s after it was let swing, 23 s after the first motion. {weak}")
-    assert page.detail == f"Of {LANES} rigs that the fit allows, 75% were caught in simulation beforehand."
+    assert page.verdict.endswith(f"Upright 2 s after the swing-up began, 23 s after the first motion. {weak}")
+    assert page.detail == f"In simulation 75 % of {LANES} rigs sampled from the fit's covariance were caught."
     assert [(k.what, k.value) for k in page.findings] == [("time at the rig", "23 s")]
     (step,) = page.steps
     assert step.sentence == "Identify it at more length, and compare pole sets."
@@ -86,7 +92,7 @@ def test_standing_for_less_than_three_seconds_at_the_end_is_not_upright(done):
         result = replace(done, ascent=climbed(falls=falls))
         assert result.upright == stands
     page = chapter(result)
-    assert "It did not stand for the last 3 s, with at most 8 V." in page.verdict
+    assert "It did not stand for the last 3 s; peak command 8 V." in page.verdict
     assert not page.sound
     assert [s.sentence for s in page.steps] == ["Identify it at more length, with a person beside it."]
     stopped = replace(done, ended="a limit.")
@@ -95,17 +101,17 @@ def test_standing_for_less_than_three_seconds_at_the_end_is_not_upright(done):
 
 
 def test_what_first_motions_tell_stands_with_its_interval_of_two_standard_errors(done):
-    assert [tuple(str(x) for x in row) for row in table(chapter(done), "What the first motions tell").rows] == [
-        ("psi, shown over true", "1.000", "0.020", ""),
-        ("theta, shown over true", "0.9900", "4.0·10⁻³", ""),
+    assert [tuple(str(x) for x in row) for row in table(chapter(done), "Estimated from the first motions").rows] == [
+        ("psi, reading over true motion", "1.000", "0.020", ""),
+        ("theta, reading over true motion", "0.9900", "4.0·10⁻³", ""),
         ("force of the drive over its description", "0.520", "0.040", ""),
-        ("command lost to either side (dead zone)", "0.250", "0.030", "V"),
+        ("dead zone, command lost to either side", "0.250", "0.030", "V"),
         ("delay and lag of the drive", "4.0", "", "ms"),
         ("command at which psi broke away, up", "0.375", "", "V"),
         ("command at which psi broke away, down", "0.438", "", "V"),
     ]
     bare = replace(done, wiring=replace(GOOD, drive=None, delay=None, dead_error=None, swings=None))
-    assert [row[0] for row in table(chapter(bare), "What the first motions tell").rows] == [
+    assert [row[0] for row in table(chapter(bare), "Estimated from the first motions").rows] == [
         "command at which psi broke away, up", "command at which psi broke away, down",
     ]  # fmt: skip
 
@@ -137,7 +143,7 @@ def test_where_the_wiring_is_wrong_no_loop_is_closed_and_each_remedy_is_a_step(d
     ]  # fmt: skip
     assert [s.command.endswith("--quick") for s in page.steps] == [True, False]
     assert page.detail.startswith("Motor leads swapped: change the motor's two leads over. Theta: counts per turn 8000")
-    assert [part.title for part in page.parts] == ["How it is wired"]
+    assert [part.title for part in page.parts] == ["Wiring"]
     assert [(k.what, k.value) for k in page.findings] == [("wiring", refused)]
     unwired = replace(done, refused="too few", ascent=None, share=None)
     assert [(k.what, k.value) for k in chapter(unwired).findings] == [("no loop", "too few")]

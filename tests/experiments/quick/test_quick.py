@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import upright as up
 from upright.errors import BadInput
+from upright.experiments.quick.chapter import chapter
 from upright.experiments.quick.run import run_quick
 from upright.experiments.stand.live import live_stand
 from upright.logs import read_log
+from upright.report.page import Table
 
 
 def described(folder, make="furuta", **faults):
@@ -36,6 +40,22 @@ def test_a_twin_comes_upright_within_a_minute_of_its_own_time_and_nobody_is_aske
     last = log.columns["t"] > log.columns["t"][-1] - 3.0
     turned = np.abs(log.columns["theta"][last]) % (2 * np.pi)
     assert np.abs(turned - np.pi).max() < np.radians(10)
+
+
+@pytest.mark.slow
+def test_the_page_of_a_minute_says_first_what_stops_it_and_gives_gains_in_the_units_of_command_and_state(tmp_path):
+    result = run_quick(live_stand(described(tmp_path)), tmp_path / "out")
+    gains = next(
+        t for p in chapter(result).parts for t in p.content if isinstance(t, Table) and "feedback" in t.caption
+    )
+    assert [row[2] for row in gains.rows] == ["V/rad", "V/(rad/s)"] * 2
+    stopped = chapter(replace(result, ended="the host went silent."))
+    assert stopped.verdict.startswith("The swing-up was stopped after ")
+    assert "the host went silent." in stopped.verdict
+    assert not stopped.sound
+    refused = chapter(replace(result, refused="no rig was caught", law=None, ascent=None))
+    assert refused.verdict.startswith("No loop was closed: no rig was caught.")
+    assert "Gains, swing-up and catch" not in [part.title for part in refused.parts]
 
 
 @pytest.mark.slow

@@ -53,6 +53,39 @@ def test_the_study_of_its_logs_says_what_its_owner_says(own, tmp_path):
     assert study.runs[0].y[-1, 1] == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize(
+    ("at", "start", "settled", "tilt", "from_rest"),
+    [
+        ("hanging", None, False, 0.0, False), ("inverted", None, True, 0.0, True),
+        ("inverted", [0.0, 0.0, 0.1, 0.0], False, 0.1, False),
+    ],
+)  # fmt: skip
+def test_a_loop_begins_where_its_rig_rests_or_as_far_aside_as_a_hand_holds_it(
+    own, tmp_path, monkeypatch, at, start, settled, tilt, from_rest
+):
+    """And runs one sample longer than its seconds, so that it has both ends."""
+    asked: list[RunRequest] = []
+
+    def run(_self, request, _folder):
+        asked.append(request)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(type(own), "_run", run)
+    with pytest.raises(KeyboardInterrupt):
+        own.hold(
+            Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[0.0, -1.0]]),
+            at,
+            tmp_path,
+            "held",
+            3.0,
+            start=start,
+            settled=settled,
+        )
+    (request,) = asked
+    assert (request.tilt, request.from_rest, request.settled, request.check) == (tilt, from_rest, settled, not settled)
+    assert request.seconds == pytest.approx(3.0 + 0.002)
+
+
 def test_a_rig_described_by_a_fit_is_that_rig_still(tmp_path):
     text = 'kind = "twin"\nmake = "furuta"\nseed = 3\n[limits]\ncommand = "4 V"\n[limits.psi]\ntravel = "1 rad"\n'
     copied = made(tmp_path, text).file.with_fit(tmp_path / "1b" / "fit.json", tmp_path / "2" / "rig.toml")

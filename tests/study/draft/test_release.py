@@ -10,7 +10,7 @@ import pytest
 from upright.physics import CartPendulum, Pendulum, find
 from upright.readers import read
 from upright.simulation import Held, simulate
-from upright.study.draft.release import free_stretches, free_swings
+from upright.study.draft.release import free_from, free_stretches, free_swings
 
 DT = 0.01
 PENDULUM = Pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3, b_2c=1e-3)
@@ -181,6 +181,15 @@ def test_each_swing_of_a_pendulum_is_a_run_and_the_last_one_is_predicted(drafted
     _, study = drafted("pendulum", t=np.arange(theta.size) * DT, theta=theta)
     assert [run.role for run in study.runs] == ["fit", "fit", "predict"]
     free_and_whole([(run.t[0], run.t[-1]) for run in study.runs], spans, PERIOD, seconds)
+
+
+@pytest.mark.parametrize(("samples", "starts"), [(90, 0.25), (91, 0.0)])
+def test_a_log_of_ten_smoothing_widths_shows_accelerations_and_a_shorter_one_is_taken_at_its_amplitudes(
+    samples, starts
+):
+    """A swing of 1 s read every 10 ms is smoothed over a twelfth of it, the nine samples about 8.3."""
+    t = 0.01 * np.arange(samples)
+    assert free_from(t, 0.3 * np.exp(-0.1 * t) * np.cos(2 * np.pi * t), 2 * np.pi, 0.25) == starts
 
 
 def test_where_nothing_swings_no_stretch_is_free():

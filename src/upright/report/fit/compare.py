@@ -119,7 +119,7 @@ def _prediction(compared: Comparison, beaten: list[str]) -> str:
     worst = {who: min(run.worst(who) for run in compared.new.values()) for who in compared.parameters}
     others = ", ".join(f"{who} {percent(v)}" for who, v in worst.items() if who != best)
     base = [run.worst(BLACK_BOX) for run in compared.new.values() if BLACK_BOX in run.scores]
-    against = [others] * bool(others) + [f"black box {percent(min(base))}"] * bool(base)
+    against = [others] * bool(others) + [f"black box {percent(reached)}" for reached in sorted(base)[:1]]
     head = f"{best} predicts it." if len(worst) == 1 else f"{best} predicts best."
     text = f"{head} It explains {percent(worst[best])} of the worst signal"
     text += f" ({', '.join(against)})." if against else "."

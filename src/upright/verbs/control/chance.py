@@ -113,7 +113,7 @@ def chance(
     doubt = [] if known.draws else ["The fit has no covariance: only dry friction and the hand vary."]
     doubt += doubts(known, rig)
     chapter = Chapter(
-        title=f"Chance that the gains hold the {rig.name}",
+        title=f"Probability that the gains stabilise the {rig.name}",
         verdict=f"Stabilised for {seconds:g} s on {share} of {draws} rigs sampled from the fit's covariance"
         f"{_effort(predicted)}" if predicted.basis.supports else UNSUPPORTED, detail=limits,
         sound=predicted.quiet_share > 0.95, warnings=tuple(doubt),
