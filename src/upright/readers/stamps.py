@@ -18,14 +18,14 @@ def in_seconds(text: str) -> tuple[str, str]:
     Commas before a fraction of a second are read where something else parts the cells.
     """
     stamp = re.compile(_STAMP.replace("MARK", "."), re.MULTILINE)
-    found = stamp.search(text, 0, _HEAD)
-    if found is None:
+    begin = stamp.search(text, 0, _HEAD)
+    if begin is None:
         return text, ""
-    row = text[found.start() : text.find("\n", found.end()) if "\n" in text[found.end() :] else None]
+    row = text[begin.start() :].partition("\n")[0]
     parted = ";" in row or "\t" in row
     if parted:
         stamp = re.compile(_STAMP.replace("MARK", ".,"), re.MULTILINE)
-    cells = stamp.sub("", text[found.start() :])
+    cells = stamp.sub("", text[begin.start() :])
     mark = "," if parted and "," in cells and "." not in cells else "."
     first, began = None, ""
 
