@@ -28,8 +28,8 @@ from benchmarks.hazards.sound import MAKES, Breaking, Lane, Played
 from benchmarks.measure import Line, Target, page
 from upright.rig.makes import make_rig
 
-LANES, SECONDS, FIRST = 30, 600.0, 1001
-BROKEN, AFTER, WATCHED = 12, 5.0, 25.0
+LANES, SECONDS, FIRST = 30, 600.0, 6001
+BROKEN, BROKEN_FIRST, AFTER, WATCHED = 12, 1001, 5.0, 25.0
 
 
 def _shown(channel: int, factor: float, twins: Twins, t: float) -> None:
@@ -93,7 +93,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         body += ["", f"## Something broken: {make_rig(make).name}", "", *HEAD]
         for what, (breaking, word) in list(all_of.items())[:: 18 if quick else 1]:
             progress(f"{make}: {what}")
-            lanes = Played(make, range(FIRST, FIRST + (3 if quick else BROKEN)), WATCHED, breaking).run()
+            lanes = Played(make, range(BROKEN_FIRST, BROKEN_FIRST + (3 if quick else BROKEN)), WATCHED, breaking).run()
             row, line = judged(make, what, word, lanes)
             body.append(row)
             lines.append(line)

@@ -72,6 +72,15 @@ def design(out: Path) -> Path:
     return out / "design.html"
 
 
+def run(out: Path) -> Path:
+    """Three seconds of a sine on a twin behind the protocol."""
+    import upright as up
+
+    (out / "RIG.toml").write_text('kind = "twin"\nmake = "furuta"\nseed = 3\n', encoding="utf-8")
+    up.run(out / "RIG.toml", excite="sine 0.3 1", duration=3.0, watch=False, out=out, pdf=True)
+    return next(out.glob("*.html"))
+
+
 def compare(out: Path) -> Path:
     """Two fits of one rig, by a sweep and by free swings, on a swing that one of them saw."""
     import upright as up
@@ -101,6 +110,7 @@ PAGES: dict[str, Callable[[Path], Path]] = {
     "fit": _of_lab("identify", "4/free_swing.toml", "report.html"),
     "regulate": _of_lab("regulate", "1b/fit.json", "report.html"),
     "design": design,
+    "run": run,
     "track": _of_lab("track", "3/fit.json", "track.html"),
     "swing-up": _of_lab("swing_up", "1b/fit.json", "swing_up.html"),
     "ladder": _of_lab("ladder", "4/level_model.toml", "ladder.html"),

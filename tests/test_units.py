@@ -41,6 +41,13 @@ from upright.records.columns import stated_unit, time_scale
         ("0.3", "1", 0.3),
         ("1 in", "m", 0.0254),
         ("2mm", "m", 0.002),
+        ("1.5 mNm", "N m", 1.5e-3),
+        ("3 Ncm", "N m", 0.03),
+        ("2 Nms/rad", "N m s/rad", 2.0),  # no plural
+        ("2 mNms", "N m s", 2e-3),
+        ("4 Ns/m", "N s/m", 4.0),
+        ("0.1 Vs/rad", "V s/rad", 0.1),
+        ("16000 ticks/rev", "counts/rad", 16000 / (2 * math.pi)),
     ],
 )
 def test_a_value_becomes_si(text: str, expected: str, value: float) -> None:
@@ -51,7 +58,7 @@ def test_a_value_becomes_si(text: str, expected: str, value: float) -> None:
     ("text", "expected", "sentence"),
     [
         ("2 V", "kg m^2", "a voltage: use 'kg m\\^2'"),
-        ("2 Nm", "N m", "did you mean 'N m'"),
+        ("2 nm", "N m", "a length"),
         ("1 Kg", "kg", "did you mean 'kg'"),
         ("2 kgm^2", "kg m^2", "did you mean 'kg m\\^2'"),
         ("3 counts", "rad", "encoder counts"),

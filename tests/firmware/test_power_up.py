@@ -94,6 +94,28 @@ def test_a_rig_that_is_wired_well_passes_every_step(walked):
     ]  # fmt: skip
 
 
+def test_who_leaves_the_arm_where_the_turn_by_hand_ended_is_asked_to_bring_it_back(host, tmp_path):
+    """The board refused to be armed there, latched START, and the walk said not to close a loop."""
+
+    class Forgets(Maker):
+        def __call__(self, sentence):
+            if "Supply on" not in sentence:
+                return super().__call__(sentence)
+            self.said.append(sentence)
+            self.board.do("put 1.6 0 0 0", "release", "run 200")
+            return True
+
+    board = host(*plant(TRUTH.parameters(), GAIN))
+    (tmp_path / "study.toml").write_text(KNOWN, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text(RIG.format(port=board.port), encoding="utf-8")
+    maker = Forgets(board)
+    found = check_up(tmp_path / "RIG.toml", hand=maker, wait=lambda s: board.do(f"run {round(1e3 * s)}"), clear=True)
+    assert found.sound, found.verdict
+    again = [s for s in maker.said if "bring it back" in s]
+    assert len(again) == 1
+    assert "psi is 91.7 degrees from where it was at the beginning" in again[0]
+
+
 WIRED = {
     "swapped leads": (["motor -1"], {}, "the drive, forward", "leads are swapped"),
     "no enable line": (["motor 0"], {}, "the drive, forward", "enable line"),

@@ -294,5 +294,5 @@ def test_a_delimiter_behind_the_last_column_is_no_column(header, newline):
 
 def test_a_last_column_that_is_named_and_left_empty_is_named_in_the_sentence():
     rows = "\n".join(f"{t:.2f},{x:.6f}," for t, x in zip(SWING_T, SWING, strict=True))
-    with pytest.raises(BadInput, match=r"column 3 \(u\): expected a number, got an empty cell"):
+    with pytest.raises(BadInput, match=r"column 3 \(u\): this column is empty in every row"):
         read_source(source(f"t,theta,u\n{rows}\n".encode()))

@@ -1,7 +1,8 @@
 """Record of a table of numbers, with or without a line of names; and of a record that this package wrote as text.
 
 Commas, semicolons, tabs or blanks part the cells; names stand in the line above the numbers, perhaps after
-a ``#`` or ``%``. Without names the columns are c0, c1, ... and c0 is the time when it increases.
+a ``#`` or ``%``. Without names the columns are c0, c1, ... and c0 is the time when it increases. The first column may
+hold dates and times of day.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from upright.readers.reader import READERS, Reader
 from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuild
 from upright.readers.source import Source, TextTable
+from upright.readers.stamps import in_seconds
 from upright.records import Array, Record
 from upright.records.columns import stated_time_unit, stated_unit, time_scale
 from upright.records.record import CSV_MARK
@@ -31,7 +33,8 @@ def layout(source: Source, text: str | None = None) -> TextTable:
     BadInput
         When no line begins with a number, or a name stands above two columns.
     """
-    text = source.text if text is None else text
+    given = source.text if text is None else text
+    text, began = in_seconds(given)
     lines = _first_lines(text)
     first = next((i for i, line in enumerate(lines) if begins_with_number(line)), -1)
     if first < 0:
@@ -44,7 +47,7 @@ def layout(source: Source, text: str | None = None) -> TextTable:
     candidates = [lines[i].strip() for i in above]
     delimiter = _delimiter(lines[first], candidates[-1] if candidates else "")
     if delimiter and _trails(lines[first], candidates[-1] if candidates else "", delimiter):
-        return layout(source, re.sub(rf"{re.escape(delimiter)}[ \t]*$", "", text, flags=re.MULTILINE))
+        return layout(source, re.sub(rf"{re.escape(delimiter)}[ \t]*$", "", given, flags=re.MULTILINE))
     width = len(lines[first].split(delimiter))
     names = _split(re.sub(r"^[#%]+\s*", "", candidates[-1]), delimiter) if candidates else []
     if names and len(names) != width and not candidates[-1].startswith(("#", "%")):
@@ -75,6 +78,7 @@ def layout(source: Source, text: str | None = None) -> TextTable:
         first_line=first + 1,
         decimal_comma=comma,
         named=named,
+        began=began,
     )
 
 
@@ -94,7 +98,9 @@ def read(source: Source) -> Record:
     table = text.numbers()
     at, seconds = _time_column(text, table)
     notes: list[str] = []
-    if not text.named:
+    if text.began:
+        notes.append(f"Time is counted from the first sample, {text.began}.")
+    elif not text.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
     elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
         notes.append(f"No column is named like a time; '{text.names[at]}' is the first and increases.")
@@ -173,6 +179,8 @@ def _split(line: str, delimiter: str | None) -> list[str]:
 
 
 def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
+    if text.began:
+        return 0, 1.0
     for j, name in enumerate(text.names if text.named else ()):
         if seconds := time_scale(name):
             return j, seconds

@@ -31,7 +31,8 @@ _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.I
 _EFFORT = re.compile(
     r"(?i:u|v|i|f|t|tau|motor|force|moment)_?(?i:\d|m|motor)?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*"
 )
-EFFORTS = ("V", "A", "N", "N m")
+LOADS = ("N", "N m")
+EFFORTS = ("V", "A", *LOADS)
 _DRIVE = re.compile(
     r"^([uv]_?m?|i)$|effort|control|command|cmd|input|volt|current|torque|target|duty|feedforward|pwm|ref",
     re.IGNORECASE,
@@ -226,8 +227,10 @@ def _is_drive(name: str, values: Array, unit: str) -> bool:
     """Whether a column drives rather than is measured: by name, or because it moves in a few steps only."""
     if _DRIVE.search(name) or effort_unit(name):
         return True
+    if unit not in ("", "1") and any(units.same_dimension(unit, load) for load in LOADS):
+        return bool(np.ptp(values) > 0)  # no rig here measures one that it does not apply
     changes = int(np.count_nonzero(np.diff(values)))
-    if any(units.same_dimension(unit, effort) for effort in EFFORTS) and unit not in ("", "1"):
+    if unit not in ("", "1") and any(units.same_dimension(unit, effort) for effort in EFFORTS):
         return 0 < changes <= 0.1 * values.size  # a potentiometer's volts change with every sample
     levels = np.unique(values).size
     return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.1 * values.size

@@ -142,6 +142,8 @@ class TextTable:
         Line number of the first row in the file, counted from 1.
     named : bool
         Whether the log itself names its columns.
+    began : str
+        Date and time of the first row, where the first column holds such instead of seconds.
     """
 
     source: Source
@@ -152,6 +154,7 @@ class TextTable:
     start: int = 0
     decimal_comma: bool = False
     named: bool = True
+    began: str = ""
 
     @property
     def body(self) -> str:

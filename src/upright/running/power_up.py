@@ -40,6 +40,9 @@ PLAINLY = 10.0
 PATIENCE = 15.0
 """In which a person pushes the driven body to the end of its travel [s]."""
 
+REMINDERS = 3
+"""How often a person is asked to bring the driven body back who has left it off its start window."""
+
 PAUSE = threading.Event()
 Hand = Callable[[str], bool]
 
@@ -240,6 +243,16 @@ class FirstPowerUp:
     def _steadied(self, request: str = "Bring all to rest where it hangs, and take your hands away.") -> None:
         if self.hand is not None:
             self.hand(request)
+            for _ in range(REMINDERS):  # a board that is armed elsewhere latches a fault
+                tick, name = self.rig.exchange(0.0), self._driven_name
+                off = tick.counts[self.driven] / self.beside.about.counts[self.driven]
+                within, unit = self.beside.held.start[self.driven], self.model.plant.coordinates[self.driven].unit
+                if abs(off) <= within:
+                    return
+                self.hand(
+                    f"{name} is {_amount(off, unit)} from where it was at the beginning, and the drive is tried within "
+                    f"{_amount(within, unit)} of that: bring it back, and let all hang at rest."
+                )
         elif self.twin is not None:
             self.twin.hold(self.beside.duty.zero)
             self.twin.let_go()

@@ -63,19 +63,19 @@ def firmware_build(
         When there is no such board, or a tool is missing.
     """
     from upright.report.page import Chapter, Facts, Part
-    from upright.rigs.firmware import board_of, build_image
+    from upright.rigs.firmware import board_of, build_image, ceilings_in_words
 
     if out is None:
         raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
     image = build_image(made, drive, Path(out), _ceilings(rig, brake, drive))
     whence = "As it comes with this package." if image.ready else "Built here."
-    held = tuple((name.lower().replace("_", " "), str(value)) for name, value in image.ceilings.items())
+    held = ceilings_in_words(image.ceilings)
     return Answer(
         image,
         Chapter(
             title=f"Firmware for the {made.title}", verdict=f"{image.path.name} is ready to be flashed.", detail=whence,
-            parts=(Part("Ceilings, in counts, percent and ticks", (Facts(held),)),) if held else (),
+            parts=(Part("Compiled in: no host can widen it", (Facts(held),)),) if held else (),
             numbers={"image": str(image.path), "ready": image.ready, "ceilings": dict(image.ceilings)},
         ),
         [image.path],

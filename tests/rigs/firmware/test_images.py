@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.boards import COUNTS, FULL_SCALE, Board
 from upright.errors import BadInput
-from upright.rigs.firmware import BOARDS, board_of, build_image, ceilings_of
+from upright.rigs.firmware import BOARDS, board_of, build_image, ceilings_in_words, ceilings_of
 from upright.rigs.firmware import images as images_of
 from upright.rigs.protocol import Limits
 
@@ -65,6 +65,15 @@ def test_ceilings_are_a_rig_s_limits_in_counts_ticks_and_percent():
     """16,000 counts a turn: 1.5 rad are 3819.7 of them, 20 rad/s 407.4 in 8 ms."""
     assert ceilings_of(LIMITS, (COUNTS, -COUNTS), FULL_SCALE) == {
         "COMMAND": 50, "TRAVEL_1": 3820, "SPEED_1": 408, "TRAVEL_2": 0x7FFFFFFF, "SPEED_2": 612, "SATURATION": 700,
+    }  # fmt: skip
+
+
+def test_a_maker_reads_each_ceiling_with_its_unit_and_none_where_there_is_none():
+    words = dict(ceilings_in_words({**ceilings_of(LIMITS, (COUNTS, COUNTS), FULL_SCALE), "BRAKE": 300}))
+    assert words == {
+        "command": "50 % of full output", "travel of encoder 1": "3,820 counts", "travel of encoder 2": "none",
+        "speed of encoder 1": "408 counts in 8 ms", "speed of encoder 2": "612 counts in 8 ms",
+        "time at the largest command": "700 ms", "brake after a stop": "300 ms",
     }  # fmt: skip
 
 

@@ -65,6 +65,22 @@ def ceilings_of(limits: Limits, counts: tuple[float, ...], full_scale: float) ->
     return out
 
 
+def ceilings_in_words(ceilings: Mapping[str, int]) -> tuple[tuple[str, str], ...]:
+    """Ceilings as a person reads them, each with its unit."""
+
+    def shown(name: str, value: int) -> str:
+        if name == "COMMAND":
+            return f"{value} % of full output"
+        if name.startswith(("TRAVEL", "SPEED")):
+            within = "" if name.startswith("TRAVEL") else f" in {1e3 * _WINDOW * _TICK:g} ms"
+            return "none" if value == _NO_LIMIT else f"{value:,} counts{within}"
+        return f"{1e3 * _TICK * value:g} ms"
+
+    words = {"SATURATION": "time at the largest command", "BRAKE": "brake after a stop"}
+    rows = ((words.get(n) or n.lower().replace("_", " of encoder "), shown(n, v)) for n, v in ceilings.items())
+    return tuple(rows)
+
+
 def build_image(board: BoardKind, drive: str, out: Path, ceilings: Mapping[str, int] | None = None) -> Image:
     """The image of a board in a folder; the one that came with the package where it is as good and nothing can build.
 
