@@ -70,3 +70,38 @@ def test_a_signature_says_what_a_verb_takes_and_has_ten_parameters_at_most(name)
     for p in parameters:
         annotation = str(p.annotation)
         assert not re.fullmatch(r"(str \| )?(typing\.)?Any( \| None)?|Sequence\[Any\]|object", annotation), p.name
+
+
+WRONG = [object(), -3j, b"x", {3: 4}, [[1, "a"]], np.zeros((2, 3)), up.Furuta]
+"""No path, text, number or truth value."""
+
+
+@pytest.mark.parametrize(
+    ("name", "argument"),
+    [
+        (name, p.name)
+        for name in VERBS
+        for p in inspect.signature(getattr(up, name)).parameters.values()
+        if str(p.annotation).removesuffix(" | None") in ("PathLike", "str", "int", "float", "bool")
+    ],
+)
+def test_an_argument_of_another_kind_than_its_signature_states_is_named(name, argument):
+    for wrong in WRONG:
+        with pytest.raises(BadInput, match=f"^{argument} (takes|is) "):
+            getattr(up, name)(**{argument: wrong})
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_chain_is_of_a_whole_number_of_bodies_and_of_a_kind_with_a_name(wrong):
+    with pytest.raises(BadInput, match="1 to 9 bodies"):
+        up.chain(wrong)
+    with pytest.raises(BadInput, match="'rectilinear' or 'torsional'"):
+        up.chain(2, wrong)
+
+
+def test_what_numpy_counts_and_asks_counts_too(tmp_path):
+    with pytest.raises(BadInput, match="There is no file"):
+        up.show(tmp_path / "none.csv", plot=np.bool_(False))
+    model = up.StateSpace(A, B, np.eye(2))
+    assert up.hold(model, np.float32(0.5), delay=np.float64(0.0)).dt == 0.5
+    assert up.chain(np.int64(2)) is up.chain(2)

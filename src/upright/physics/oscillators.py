@@ -8,6 +8,7 @@ flexible mode at ``sqrt(k_12 (1/m_1 + 1/m_2))``: the paper's flexible manipulato
 from __future__ import annotations
 
 from functools import cache
+from numbers import Integral
 from typing import Any
 
 from upright.errors import BadInput, ImpossiblePhysics
@@ -50,9 +51,9 @@ def chain(bodies: int, kind: str = "rectilinear") -> type[Plant]:
     BadInput
         When `bodies` or `kind` is none of these.
     """
-    if kind not in _UNITS:
+    if not (isinstance(kind, str) and kind in _UNITS):
         raise BadInput(f"a chain is 'rectilinear' or 'torsional', got '{kind}'")
-    if not 1 <= bodies <= 9:
+    if not (isinstance(bodies, Integral) and 1 <= bodies <= 9):
         raise BadInput(f"a chain has 1 to 9 bodies, got {bodies}")
     built_in = _BUILT_IN.get((kind, bodies))
     return built_in if built_in is not None else _chain(bodies, kind)
