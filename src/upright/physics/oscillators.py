@@ -51,7 +51,7 @@ def chain(bodies: int, kind: str = "rectilinear") -> type[Plant]:
     BadInput
         When `bodies` or `kind` is none of these.
     """
-    if not (isinstance(kind, str) and kind in _UNITS):
+    if str(kind) not in _UNITS:
         raise BadInput(f"a chain is 'rectilinear' or 'torsional', got '{kind}'")
     if not (isinstance(bodies, Integral) and 1 <= bodies <= 9):
         raise BadInput(f"a chain has 1 to 9 bodies, got {bodies}")
