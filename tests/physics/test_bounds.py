@@ -113,6 +113,7 @@ def test_masses_are_counted_from_none_and_weigh_something():
     ("given", "said"),
     [
         ({"m_p": 0.2, "l_cg": 0.2, "b_1": 1e-3}, "Pendulum has no parameter 'b_1'; did you mean 'b_2'"),
+        ({}, r"Pendulum also needs m_p, mass of the pendulum \[kg\]; l_cg"),
         ({"m_p": 0.2}, r"Pendulum also needs l_cg, pivot to centre of gravity \[m\]"),
     ],
 )

@@ -97,8 +97,8 @@ class Statement:
             _as_dataclass(cls)
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
-        """Answer for a misspelt parameter; copies are made without any."""
-        known = {f.name: f for f in fields(cls)} if given else {}  # type: ignore[arg-type]
+        """Answer for a misspelt or a missing parameter."""
+        known = {f.name: f for f in fields(cls)}  # type: ignore[arg-type]
         for name in given.keys() - known.keys():
             raise BadInput(f"{cls.__name__} has no parameter '{name}'; {nearest(name, known)}")
         missing = [n for n, f in known.items() if f.default is MISSING and n not in given]
@@ -106,6 +106,10 @@ class Statement:
             needed = "; ".join(f"{n}, {cls.quantity(n).meaning} [{cls.quantity(n).unit}]" for n in missing)
             raise BadInput(f"{cls.__name__} also needs {needed}.")
         return super().__new__(cls)
+
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        """What `__new__` is given for a copy, which is made without `__init__`."""
+        return (), {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         for name, what in quantities(self).items():

@@ -24,7 +24,7 @@ _OPTION = re.compile(r"(?<![\w-])(--?[a-z][a-z-]*)(?: (\"[^\"]*\"|\d[\d.]*\b|[A-
 
 _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
     "PathLike": ((str, os.PathLike), "a path such as 'rig/fit.json'"),
-    "str": ((str,), "a text"),
+    "str": ((str, os.PathLike), "a text"),
     "int": ((Integral,), "a whole number"),
     "float": ((Real,), "a number"),
 }
