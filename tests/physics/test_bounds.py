@@ -122,6 +122,11 @@ def test_a_plant_answers_for_what_is_misspelt_or_missing(given, said):
         Pendulum(**given)
 
 
+@pytest.mark.parametrize("name", list(BUILT_IN))
+def test_the_class_of_every_plant_can_be_sent(name):
+    assert pickle.loads(pickle.dumps(BUILT_IN[name])) is BUILT_IN[name]
+
+
 def test_a_plant_can_be_sent_and_copied():
     rod = Pendulum(m_p=0.2, l_cg=0.2)
     assert pickle.loads(pickle.dumps(rod)) == copy.deepcopy(rod) == rod

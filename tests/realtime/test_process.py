@@ -264,3 +264,12 @@ def test_a_drive_that_is_on_goes_off_with_the_parent(tmp_path, event):
     assert (command, enabled) == (0.0, 0)
     assert writes > 1000
     assert driven <= 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux alone signals the death of a parent")
+def test_the_kernel_has_been_told_to_end_the_loop_with_its_parent():
+    """As it says itself: PR_GET_PDEATHSIG of prctl(2) is 2."""
+    asked = "from upright.realtime.process import _end_with_parent; import ctypes; _end_with_parent()"
+    told = "signal = ctypes.c_int(); ctypes.CDLL(None).prctl(2, ctypes.byref(signal)); print(signal.value)"
+    ran = subprocess.run([sys.executable, "-c", f"{asked}; {told}"], capture_output=True, text=True, check=True)
+    assert int(ran.stdout) == signal.SIGTERM

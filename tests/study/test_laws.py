@@ -121,6 +121,8 @@ def test_limits_delay_and_rounding_are_handed_on():
         ('kind = "pid"\nkp = [1, 2]', "kp has 2 values for 1 measured coordinates"),
         ('kind = "pid"\nkp = 1\ntaps = [0.5, 0.500002]', "taps must be two numbers that sum to 1"),
         ('kind = "pid"\nkp = 1\ntaps = [1]', "taps must be two numbers"),
+        ('kind = "pid"\nkp = 1\ntaps = ["a", "b"]', "taps must be two numbers"),
+        ('kind = "pid"\nkp = 1\ntaps = [1000000000.0, -999999999.0]', "taps must be two numbers"),
         ('kind = "pid"\nkp = 1\nperiod = "10.3 ms"', "the law is evaluated 0.9709 times per row"),
         ('kind = "pid"\nkp = 1\nperiod = "30 ms"', "it must be a whole number of times"),
         ('kind = "pid"\nkp = 1\nlimit = 0', "limit must be above zero"),

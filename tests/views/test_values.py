@@ -180,6 +180,7 @@ def test_poles_of_what_is_sampled_stand_in_the_circle_of_z(value):
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("real part of z", "imaginary part of z")
     circle = np.array(axes.lines[0].get_data())
     np.testing.assert_allclose(np.hypot(*circle), 1.0)
+    np.testing.assert_allclose(circle[:, 0], circle[:, -1], atol=1e-12)
     np.testing.assert_allclose([circle.min(axis=1), circle.max(axis=1)], [[-1, -1], [1, 1]], atol=1e-3)
     expected = np.exp(0.02 * (-3 + 4j)) if isinstance(value, up.StateSpace) else 0.5
     _, _, (re, im) = marks(axes)["poles"]

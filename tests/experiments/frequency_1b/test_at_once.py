@@ -10,9 +10,9 @@ from scipy.signal import lsim
 
 from tests.experiments.rigs import OWN, made
 from upright.errors import BadInput
-from upright.experiments.frequency_1b.at_once import _level, asking, run_at_once
+from upright.experiments.frequency_1b.at_once import _from_rest, _level, asking, run_at_once
 from upright.experiments.stand.live import live_stand
-from upright.experiments.stand.strength import SHARE
+from upright.experiments.stand.strength import SHARE, STILL
 from upright.experiments.stand.twin import TwinStand
 from upright.progress import silent
 from upright.rig.makes import MAKES, make_rig
@@ -52,6 +52,25 @@ def test_the_band_holds_the_swing_of_a_rig_that_nobody_makes(own):
     assert asked.band[0] < swing < asked.band[1]
     assert asked.band[0] == pytest.approx(0.4 * swing, rel=0.01)
     assert asked.reach[0] <= 0.25 * 2.0
+
+
+def test_a_period_of_the_command_holds_four_of_its_slowest_frequency_and_hardly_more(own):
+    """`RESOLVED`; the length is a multiple of 64 samples."""
+    asked = asking(own)
+    least = 4 * 2 * math.pi / asked.band[0] / own.rig.period
+    assert least <= asked.wave.size < least + 64
+
+
+def test_a_command_that_grows_begins_at_rest_and_never_exceeds_the_one_that_was_asked_for(own):
+    wave = asking(own).wave
+    samples = np.array(_from_rest(own, wave, 2))
+    still = samples.size - 3 * wave.size
+    growing = samples[still : still + wave.size]
+    assert not samples[:still].any()
+    assert still * own.rig.period == pytest.approx(STILL, abs=own.rig.period)
+    assert (np.abs(growing) <= np.abs(wave) + 1e-15).all()
+    assert np.sum(growing**2) == pytest.approx(np.sum(wave**2) * 3 / 8, rel=0.1)  # mean of ((1 - cos) / 2)^2
+    np.testing.assert_array_equal(samples[still + wave.size :], np.tile(wave, 2))
 
 
 def test_no_coordinate_is_to_go_further_than_asked(own):
