@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import upright as up
-from upright.basis import MEASURED
+from upright.basis import DESCRIBED, MEASURED
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
@@ -67,6 +67,14 @@ def test_a_design_of_before_and_of_now_holds_its_law(folder, tmp_path, key):
     assert as_values(replace(read, target=0.0)) == law
     assert np.asarray(read.target).tolist() == [0.0, math.pi]
     assert not basis.trusted
+    assert "does not say whether it can be trusted" in basis.sentence
+
+
+def test_a_file_that_is_a_law_rests_on_no_model(folder, tmp_path):
+    law = json.loads((folder / "design.json").read_text(encoding="utf-8"))["law"]
+    (tmp_path / "law.json").write_text(json.dumps(law), encoding="utf-8")
+    _, basis = read_law(tmp_path / "law.json", RIG, "inverted", "hanging")
+    assert basis == DESCRIBED
 
 
 def test_a_rest_within_one_count_is_said_in_counts(folder, tmp_path):

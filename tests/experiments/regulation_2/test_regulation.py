@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,10 +11,17 @@ import numpy as np
 import pytest
 
 from upright import gains
+from upright.basis import DESCRIBED
 from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.regulation_2 import chapter as regulation_page
-from upright.experiments.regulation_2.run import Regulation, RegulationRequest, identify_make, run_regulation
+from upright.experiments.regulation_2.run import (
+    Regulation,
+    RegulationRequest,
+    _run_attempt,
+    identify_make,
+    run_regulation,
+)
 from upright.experiments.stand.twin import TwinStand
 from upright.rig import Rig
 from upright.rig.completion import completed
@@ -41,6 +49,22 @@ def fit_of(truth, spread=0.01, seed=0, draws=64):
         draws=others if spread else (),
         hardware=hardware_of_make(truth),
     )
+
+
+@pytest.mark.parametrize(("may_fall", "share", "tried"), [(False, 0.49, 0), (False, 0.51, 1), (True, 0.49, 1)])
+def test_a_law_that_falls_more_often_than_not_is_tried_only_where_nothing_can_be_hit(may_fall, share, tried, tmp_path):
+    """On a live rig nobody is asked to bring the pendulum up for it either."""
+    asked = []
+
+    def ask(text):
+        asked.append(text)
+        raise InterruptedError
+
+    stand = SimpleNamespace(may_fall=may_fall, names=("the arm", "the pendulum"), ask=ask)
+    attempt = SimpleNamespace(name="set 1", before=SimpleNamespace(share=share, basis=DESCRIBED))
+    with suppress(InterruptedError):
+        assert _run_attempt(stand, attempt, SimpleNamespace(), 0, tmp_path) is None
+    assert len(asked) == tried
 
 
 @pytest.mark.slow
