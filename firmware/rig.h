@@ -2,7 +2,8 @@
  *
  *     IDLE -> ARMED -> HOST | MCU -> IDLE        any of them -> FAULT -> (CLEAR) -> IDLE
  *
- * In IDLE and FAULT the command is zero and the power stage is off, CEILING_BRAKE after it was on. A reset and a new host's HELLO end in FAULT:
+ * In IDLE and FAULT the command is zero and the power stage is off, at the latest CEILING_BRAKE ticks after a stop.
+ * A reset and a new host's HELLO end in FAULT:
  * nothing moves before the host has cleared it and said limits, none of them wider than ceilings.h. The numbers of modes and faults are those of src/upright/rigs/protocol.py, frames those of
  * src/upright/rigs/wire.py; docs/reference/firmware.md has both as tables.
  *

@@ -21,7 +21,6 @@ V = TypeVar("V", bound=Callable[..., Any])
 _COMMAND_LINE = re.compile(r"(`[^`]*`|\bupright [^;,]*)")
 _OPTION = re.compile(r"(?<![\w-])(--?[a-z][a-z-]*)(?: (\"[^\"]*\"|\d[\d.]*\b|[A-Z]{2,}\b))?")
 
-
 _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
     "PathLike": ((str, os.PathLike), "a path such as 'rig/fit.json'"),
     "str": ((str, os.PathLike), "a text"),
