@@ -49,6 +49,35 @@ def test_a_stamp_is_exact_to_a_nanosecond():
     assert began == "10:00:00.000000001"
 
 
+@pytest.mark.parametrize("order", ["%m/%d/%Y", "%d/%m/%Y"])
+def test_strokes_are_read_in_the_order_in_which_the_log_passes_midnight_once(order):
+    """From 2 to 3 February is a day; read the other way round, the same strokes are four weeks."""
+    began = datetime(2026, 2, 2, 23, 59, 30, 250000)
+    rows = [f"{(began + timedelta(seconds=s)).strftime(order + ' %I:%M:%S.%f %p')};1" for s in SECONDS]
+    np.testing.assert_allclose(record("\n".join(["When;x", *rows, ""])).t, SECONDS, rtol=0, atol=1e-12)
+
+
+def test_noon_and_midnight_of_twelve_hours_are_those_of_twenty_four():
+    text, _ = in_seconds("t,x\n12:00:00 AM,1\n1:00:00 am,2\n11:59:59 AM,3\n12:00:00 PM,4\n1:00:01 p.m.,5\n")
+    read = [float(line.split(",")[0]) for line in text.split("\n")[1:-1]]
+    assert read == [0.0, 3600.0, 12 * 3600.0 - 1, 12 * 3600.0, 13 * 3600.0 + 1]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", ", "])
+@pytest.mark.parametrize("names", [("Date", "Time"), ("Datum", "Uhrzeit")])
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_a_date_in_a_column_of_its_own_is_part_of_the_time(delimiter, names, quote):
+    stamps = [BEGAN + timedelta(seconds=s) for s in SECONDS]
+    rows = [
+        delimiter.join([f"{quote}{t:%Y/%m/%d}{quote}", f"{quote}{t:%H:%M:%S.%f}{quote}", f"{v}"])
+        for t, v in zip(stamps, VALUES, strict=True)
+    ]
+    log = record("\n".join([delimiter.join([*names, "Angle [rad]"]), *rows, ""]))
+    np.testing.assert_allclose(log.t, SECONDS, rtol=0, atol=1e-12)
+    assert list(log.signals) == ["Angle [rad]"]
+    np.testing.assert_array_equal(log["Angle [rad]"], VALUES)
+
+
 @pytest.mark.parametrize("text", ["t,x\n0.5,1\n1.5,2\n", "t,x\n10:00,1\n", "2024-02-28 of a log\nt,x\n1,2\n"])
 def test_a_log_without_stamps_is_left_as_it_is(text):
     assert in_seconds(text) == (text, "")

@@ -121,7 +121,7 @@ def read(source: Source) -> Record:
     t, note = rebuild(t, index)
     if not source.text.endswith("\n") and text.body.rstrip(" "):
         notes.append(_torn(text, table.shape[0]))
-    signals = {name: table[:, j] for j, name in enumerate(text.names) if j != at}
+    signals = {name: table[:, j] for j, name in enumerate(text.names) if j != at and not (text.began and j < at)}
     return Record(
         t=t,
         signals=signals,
@@ -180,7 +180,7 @@ def _split(line: str, delimiter: str | None) -> list[str]:
 
 def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
     if text.began:
-        return 0, 1.0
+        return int((text.delimiter or " ") in text.began), 1.0  # behind a date in a cell of its own
     for j, name in enumerate(text.names if text.named else ()):
         if seconds := time_scale(name):
             return j, seconds
