@@ -22,6 +22,7 @@ LET_GO: Mapping[str, Now] = {
 WORN: Mapping[str, Now] = {"worn": ("nonideal", lambda value: value)}
 CLUSTER: Mapping[str, Now] = {"cluster": ("workers", lambda value: value)}
 LIE: Mapping[str, Now] = {"lie": ("fault", lambda value: value)}
+DRAWN: Mapping[str, Now] = {"plot": ("out", lambda value: "." if value else None)}
 
 
 def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:
@@ -45,9 +46,11 @@ def renamed(former: Mapping[str, Now]) -> Callable[[V], V]:
                 value = options.pop(name)
                 if value is None or value == "":
                     continue
-                value = made(value)
-                before = options.get(now)
-                options[now] = {**before, **value} if isinstance(before, Mapping) else value
+                value, before = made(value), options.get(now)
+                if isinstance(before, Mapping):
+                    options[now] = {**before, **value}
+                elif before is None:
+                    options[now] = value
             return verb(*args, **options)
 
         return called  # type: ignore[return-value]

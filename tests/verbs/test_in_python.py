@@ -101,7 +101,7 @@ def test_a_chain_is_of_a_whole_number_of_bodies_and_of_a_kind_with_a_name(wrong)
 
 def test_what_numpy_counts_and_asks_counts_too(tmp_path):
     with pytest.raises(BadInput, match="There is no file"):
-        up.show(tmp_path / "none.csv", plot=np.bool_(False))
+        up.init(tmp_path / "none.csv", force=np.bool_(False))
     model = up.StateSpace(A, B, np.eye(2))
     assert up.hold(model, np.float32(0.5), delay=np.float64(0.0)).dt == 0.5
     assert up.chain(np.int64(2)) is up.chain(2)

@@ -13,7 +13,7 @@ import upright as up
 from upright.cli import COMMANDS, app
 from upright.verbs.options import shared_parameters
 
-CLI_ONLY = {"as_json", "keys", "strict", "help"}
+CLI_ONLY = {"as_json", "keys", "strict", "help", "plot"}  # in Python an answer is asked to .plot()
 
 
 def command(name: str):

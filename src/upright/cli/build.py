@@ -49,7 +49,8 @@ def build(command: Command) -> Any:
     def call(**words: Any) -> None:
         as_json = words.pop("as_json", False)
         flags = {name: words.pop(name) for name in command.flags}
-        arguments = command.prepare({n: _value(verb[n], word) for n, word in words.items()})
+        arguments = command.prepare({n: _value(verb[n], word) for n, word in words.items()} | flags)
+        arguments = {n: value for n, value in arguments.items() if n not in flags}
         with services(callbacks - arguments.keys(), quiet=as_json) as served:
             answer = command.verb(**arguments, **served)
         answer = answer if command.lines is None else command.lines(answer)

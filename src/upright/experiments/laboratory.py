@@ -440,15 +440,13 @@ def next_steps(session: Session) -> tuple[Step, ...]:
     return tuple(steps)
 
 
-def session_summary(session: Session, report: Path, pdf: Path | None) -> dict[str, Any]:
-    """The session as plain values for another program: SI."""
+def session_summary(session: Session, files: Mapping[str, str | None]) -> dict[str, Any]:
+    """The session as plain values for another program: SI; `files` that it left, none where its folder is gone."""
     return {
         "seed": session.seed,
         "rig": session.make or None,
         "nonideal": session.nonideal,
-        "folder": str(session.folder),
-        "report": str(report),
-        "pdf": str(pdf) if pdf else None,
+        **files,
         "interrupted": session.interrupted,
         "missing": [e.name for e in session.missing],
         "seconds": session.seconds,
@@ -463,7 +461,7 @@ def session_summary(session: Session, report: Path, pdf: Path | None) -> dict[st
                 "verdict": t.chapter.verdict,
                 "detail": t.chapter.detail,
                 "numbers": t.chapter.numbers,
-                "steps": [s.command for s in t.chapter.steps if s.command],
+                "steps": [s.command for s in t.chapter.steps if s.command and files],
             }
             for t in session.results
         },

@@ -19,8 +19,8 @@ class Salvaged:
     ----------
     log : RunLog
         As it was read, up to its first error.
-    file : Path
-        Where it stands as a whole file.
+    file : Path, optional
+        Where it stands as a whole file, if it was written.
     lost_bytes : int
         Bytes behind the first error, summary or torn end.
     lost_rows : int
@@ -28,23 +28,30 @@ class Salvaged:
     """
 
     log: RunLog
-    file: Path
+    file: Path | None
     lost_bytes: int
     lost_rows: int
 
 
-def recover(path: PathLike, out: PathLike) -> Salvaged:
-    """Write the rows and events of a log, up to its first error, as a whole file; the log itself stays as it is.
+def recover(path: PathLike, out: PathLike | None = None) -> Salvaged:
+    """Rows and events of a log up to its first error, as a whole file where one is named; the log stays as it is.
 
     Raises
     ------
     BadInput
         When nothing of it can be read, or `out` may not be written.
     """
-    check_output(out, path)
+    if out is not None:
+        check_output(out, path)
     log = read_log(path)
     lost = log.size - log.readable
     rows = round(lost * len(log) / log.readable) if "Every chunk" not in log.complaint else 0
+    if out is not None:
+        _write_whole(log, out)
+    return Salvaged(log=log, file=None if out is None else Path(out), lost_bytes=lost, lost_rows=rows)
+
+
+def _write_whole(log: RunLog, out: PathLike) -> None:
     with whole_file(out) as half, open(half, "wb") as stream:
         file = RunFile(stream, log.header)
         events = list(log.events)
@@ -60,7 +67,6 @@ def recover(path: PathLike, out: PathLike) -> Salvaged:
             t = float(log.columns["t"][-1]) if len(log) else 0.0
             file.event(t, "recovered", f"{len(log)} rows of {Path(log.file).name}. {log.complaint}")
         file.finish()
-    return Salvaged(log=log, file=Path(out), lost_bytes=lost, lost_rows=rows)
 
 
 def _event(file: RunFile, event: RunEvent) -> None:

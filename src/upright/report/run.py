@@ -121,7 +121,7 @@ def draw_run(log: RunLog) -> Figure:
 
 def recovered_chapter(salvaged: Salvaged) -> Chapter:
     """What was kept of a torn log."""
-    log = salvaged.log
+    log, file = salvaged.log, salvaged.file
     lost = (
         f"{salvaged.lost_bytes} bytes behind them (about {salvaged.lost_rows} rows) could not be read"
         if salvaged.lost_bytes
@@ -131,10 +131,10 @@ def recovered_chapter(salvaged: Salvaged) -> Chapter:
         title=f"{Path(log.file).name} recovered",
         verdict=f"{len(log)} rows and {len(log.events)} events kept; {lost}.",
         parts=(Part("Why", (Points((log.complaint or "The log was whole.",)),)),),
-        steps=(Step("Look at it.", f"upright log show {typed(salvaged.file)}"),),
+        steps=() if file is None else (Step("Look at it.", f"upright log show {typed(file)}"),),
         numbers={
             "rows": len(log), "events": len(log.events), "lost_bytes": salvaged.lost_bytes,
-            "lost_rows": salvaged.lost_rows, "complaint": log.complaint, "file": str(salvaged.file),
+            "lost_rows": salvaged.lost_rows, "complaint": log.complaint, "file": file and str(file),
         },
     )  # fmt: skip
 

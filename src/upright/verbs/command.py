@@ -45,8 +45,8 @@ class Command:
     hidden : collection of str
         Parameters that cannot be typed.
     flags : mapping of str to Flag
-    given : callable
-        Turns what was typed, by parameter, into what the verb is called with.
+    prepare : callable
+        Turns what was typed, by parameter or flag, into what the verb is called with; flags are left out of that.
     lines : callable, optional
         What is printed piece by piece, texts or answers, where the verb returns no answer.
     wrong : callable

@@ -7,9 +7,10 @@ import re
 import signal
 import threading
 from collections.abc import Callable, Generator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput, nearest
@@ -50,7 +51,7 @@ class Laboratory:
     def experiment(self, name: str) -> Answer[Any]:
         """One experiment's numbers and report, by its name: ``lab.experiment("3").plot("track-steps")``.
 
-        Its `pictures` name what `plot` draws, its logs and studies are in the folder of its name.
+        Its `pictures` name what `plot` draws; in the `out` that was named, a folder has its logs and studies.
 
         Raises
         ------
@@ -63,9 +64,17 @@ class Laboratory:
         return Answer(chapters[name].numbers, chapters[name])
 
 
-def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
-    """A twin asks nobody for anything, and its runs are not watched."""
-    return typed if (typed["rig"] or "").endswith(".toml") else {**typed, "ask": None, "watching": None}
+def _typed(typed: dict[str, Any]) -> dict[str, Any]:
+    """A folder of its own for each rig; a twin asks nobody for anything, and its runs are not watched."""
+    rig = typed["rig"] or ""
+    if typed["out"] is None:
+        of = (Path(rig).stem, str(typed["seed"] or ""), "nonideal" * typed["nonideal"])
+        typed["out"] = Path("-".join(["upright-lab", *filter(None, of)])) if not _is_port(rig) else Path()
+    return typed if rig.endswith(".toml") else {**typed, "ask": None, "watching": None}
+
+
+def _is_port(rig: str) -> bool:
+    return rig.startswith("serial:")
 
 
 @command(
@@ -75,10 +84,11 @@ def _nobody_needed(typed: dict[str, Any]) -> dict[str, Any]:
     helps={
         "experiment": "Only this one, and those it depends on.",
         "rig": "linear, furuta, rectilinear or torsional, else the paper's; or RIG.toml.",
+        "out": "Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.",
         "nonideal": "Rigs with unmodelled effects: stiction, ripple and play.",
     },
     ranges={"seed": (None, None)},
-    prepare=_nobody_needed,
+    prepare=_typed,
     resumes=True,  # goes on in the folder that it reads
     more="""
     1a weighs the rig with known added masses, 1b fits its frequency response hanging, 2 holds it upright with gains
@@ -115,7 +125,7 @@ def lab(
         Twin of a rig model, linear, furuta, rectilinear or torsional, else the paper's; or the RIG.toml of hardware
         (all experiments that it can have); ``"serial:PORT"`` writes one, and a study, to be filled in.
     out : path, optional
-        Folder; upright-lab[-KIND][-SEED][-nonideal] when omitted.
+        Folder; when omitted, twins leave no file, and a rig of RIG.toml is not run.
     fresh : bool
         Run again what the folder has already.
     quick : bool
@@ -152,16 +162,10 @@ def lab(
     rig = os.fspath(rig) if isinstance(rig, os.PathLike) else "" if rig is None else rig
     if not isinstance(rig, str):  # type: ignore[reportUnnecessaryIsInstance]
         raise BadInput(f"a laboratory's rig is a rig model, a RIG.toml or serial:PORT, got {type(rig).__name__}.")
-    itself = rig.endswith(".toml") or rig.startswith("serial:")
+    itself = rig.endswith(".toml") or _is_port(rig)
     if rig and not itself:
         make_named(rig)
-    kind = Path(rig).stem if itself else rig
-    named = "-".join(
-        ["upright-lab", *([kind] if kind else []), *([str(seed)] if seed else []), *(["nonideal"] if nonideal else [])]
-    )
-    at = Path(named if out is None else out)
-    if at.exists() and not at.is_dir():
-        raise BadInput(f"results need a folder, but {at} is a file; name another with -o.")
+    at = folder_if_given(out)
     from datetime import date
 
     from upright.experiments import laboratory
@@ -173,38 +177,45 @@ def lab(
 
     shared = Workers.of(workers)
     requested = _requested(texts(experiment), itself, quick=quick)
-    beside = Path() if out is None else at
-    live = _live(rig, beside, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept) if itself else None
+    live = _live(rig, at, ask, watching, nonideal=nonideal, alone=shared.alone, accept=accept) if itself else None
     rig = rig if live is None else typed(live.file.path)
     laboratory.chosen_experiments(requested, rig, live)  # says what is wrong with the call before anything is written
-    with _ctrl_c() as pressed:
+    with nullcontext(at) if at is not None else TemporaryDirectory(prefix="upright-") as folder, _ctrl_c() as pressed:
         session = laboratory.run_laboratory(
-            requested, rig, seed, at, progress, stopped=lambda: pressed.times > 0, fresh=fresh, workers=shared,
-            nonideal=nonideal, live=live,
+            requested, rig, seed, Path(folder), progress, stopped=lambda: pressed.times > 0, fresh=fresh,
+            workers=shared, nonideal=nonideal, live=live,
         )  # fmt: skip
         pressed.patient = True
         progress("writing the report", 1.0)
         book = laboratory.book(session, date.today())
-        report = write_html(at / "report.html", book)
-        pdf = write_pdf(at / "report.pdf", book) if available() else None
+        files: list[Path] = []
+        if at is not None:
+            files.append(write_html(at / "report.html", book))
+            if available():
+                files.append(write_pdf(at / "report.pdf", book))
+    if at is None:  # commands that read the folder again are not proposed
+        book = replace(book, steps=(), chapters=tuple(replace(c, steps=()) for c in book.chapters))
+    kept = {
+        "folder": str(at), "report": str(files[0]), "pdf": next((str(f) for f in files[1:]), None),
+    } if files else {}  # fmt: skip
     sound = sum(t.chapter.sound for t in session.results)
     page = Chapter(
         title=book.title, verdict=f"{sound} of {len(session.results)} verdicts are sound.",
         sound=sound == len(session.results), parts=book.cover, warnings=book.notes, steps=book.steps,
-        numbers=laboratory.session_summary(session, report, pdf), finished=not session.interrupted,
+        numbers=laboratory.session_summary(session, kept), finished=not session.interrupted,
     )  # fmt: skip
     took = {
         t.experiment.name: f"{t.rig}{', as kept from an earlier run' if t.state == 'kept' else ''}; {t.seconds:.1f} s"
         for t in session.results
     }
     hints = ["Each chapter of the report ends with the commands that repeat its steps."]
-    if pdf is None:
+    if len(files) == 1:
         hints.append("PDF: pip install 'upright[pdf]' and run the same again; nothing is computed twice.")
     answer = Laboratory(
         session=session, book=replace(book, chapters=tuple(replace(c, about=took[c.key]) for c in book.chapters)),
         interrupted=session.interrupted or pressed.times > 0, hints=tuple(hints),
     )  # fmt: skip
-    return Answer(answer, page, [report] if pdf is None else [report, pdf])
+    return Answer(answer, page, files)
 
 
 def _requested(experiments: Sequence[str], itself: bool, *, quick: bool) -> Sequence[str]:
@@ -217,7 +228,7 @@ def _requested(experiments: Sequence[str], itself: bool, *, quick: bool) -> Sequ
 
 
 def _live(
-    rig: str, folder: Path, ask: Callable[[str], bool] | None,
+    rig: str, folder: Path | None, ask: Callable[[str], bool] | None,
     watching: Callable[[], AbstractContextManager[Callable[[RunState], str]]] | None, *, nonideal: bool, alone: bool,
     accept: str | None,
 ) -> LiveStand:  # fmt: skip
@@ -228,14 +239,16 @@ def _live(
 
     if nonideal or not alone:
         raise BadInput("--nonideal and --workers are for twins of makes; on hardware there is one rig, as it is.")
-    if rig.startswith("serial:"):
+    if not Path(rig).exists() and not _is_port(rig):
+        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a rig model: linear, furuta, ...")
+    if folder is None:
+        raise BadInput("what is measured on a rig is kept: name a folder for it, such as out='laboratory'.")
+    if _is_port(rig):
         path = write_templates(folder, rig.removeprefix("serial:"))
         raise BadInput(
             "a rig of hardware needs a description and limits, which only you know: fill in "
             f"{path.with_name('study.toml')} and {path}, then run upright lab --rig {typed(path)}"
         )
-    if not Path(rig).exists():
-        raise BadInput(f"there is no file '{rig}'; name the RIG.toml of a rig, or a rig model: linear, furuta, ...")
     live = live_stand(Path(rig), ask or nobody, watching or nobody_watches, accept)
     if live.file.hardware and ask is None:
         raise BadInput("experiments on hardware need a person beside it: run upright lab in a terminal, or give ask.")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
 from upright.files import check_output, keeps_its_inputs, regular, replace_file
+from upright.renamed import DRAWN, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder, folder_if_given, pdf_has_folder, write_page
@@ -57,19 +58,17 @@ def read(file: Log, *, reader: str | None = None, time_unit: str | None = None) 
     return open_log(file, reader, time_unit)[0]
 
 
+@renamed(DRAWN)
 @keeps_its_inputs
-def show(
-    log: Log, *, out: PathLike | None = None, plot: bool = False, time_unit: str | None = None
-) -> Answer[Inspection]:
+def show(log: Log, *, out: PathLike | None = None, time_unit: str | None = None) -> Answer[Inspection]:
     """What a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
     Parameters
     ----------
     log : path, Record or pandas.DataFrame
     out : path, optional
-        Folder for the picture show-LOG.svg, or the picture's own name (SVG, PNG).
-    plot : bool
-        Draw the columns also where no `out` is named: into the current folder.
+        Folder for the picture show-LOG.svg, or the picture's own name (SVG, PNG); the answer's ``plot()`` draws it
+        without a file.
     time_unit : str, optional
         Unit of a file's time column that states none, such as "ms".
 
@@ -91,10 +90,10 @@ def show(
     record, path = open_log(log, time_unit=time_unit)
     inspection = inspect(record)
     files: list[Path] = []
-    if plot or out is not None:
+    if out is not None:
         from upright.report.drawing import save
 
-        at = Path() if out is None else Path(out)
+        at = Path(out)
         files.append(at if at.suffix in (".svg", ".png") else picture_path(path, folder(at)))
         save(draw_columns(record, inspection), files[-1])
     clock = f" --time-unit {time_unit}" if time_unit else ""

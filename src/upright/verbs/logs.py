@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 from upright.errors import BadInput
 from upright.files import PathLike, check_output, keeps_its_inputs
+from upright.renamed import DRAWN, renamed
 from upright.verbs.answer import Answer
-from upright.verbs.command import command
+from upright.verbs.command import Flag, command
 from upright.verbs.pages import folder
 from upright.verbs.values import path_of
 
@@ -28,13 +29,14 @@ _CONVERTED = (".csv", ".parquet", ".mat")
 
 @command(
     name="log show",
-    helps={"plot": "Draw the columns to show-LOG.svg."},
     defaults={"out": "."},
+    flags={"plot": Flag(help="Draw the columns to show-LOG.svg.")},
     prepare=lambda typed: {**typed, "out": typed["out"] if typed["plot"] else None},
     more="upright log show run.mcap --plot",
 )
+@renamed(DRAWN)
 @keeps_its_inputs
-def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) -> Answer[RunLog]:
+def log_show(log: PathLike, *, out: PathLike | None = None) -> Answer[RunLog]:
     """Print what a run's log holds: rig, law, duration, rate, modes, faults, events, missing rows.
 
     Parameters
@@ -42,9 +44,7 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     log : path
         Log of a run (MCAP), whole, torn, or still being written.
     out : path, optional
-        Folder for the picture show-LOG.svg.
-    plot : bool
-        Draw the columns also where no `out` is named: into the current folder.
+        Folder for the picture show-LOG.svg; the answer's ``plot()`` draws it without a file.
 
     Returns
     -------
@@ -63,10 +63,10 @@ def log_show(log: PathLike, *, out: PathLike | None = None, plot: bool = False) 
     log = path_of(log, "the log of a run")
     run = read_log(log)
     files: list[Path] = []
-    if (plot or out is not None) and len(run) > 1:
+    if out is not None and len(run) > 1:
         from upright.report.drawing import save
 
-        files.append(picture_path(Path(log), folder(Path() if out is None else out)))
+        files.append(picture_path(Path(log), folder(out)))
         save(draw_run(run), files[-1])
     return Answer(run, chapter(run), files)
 
@@ -131,7 +131,13 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
         last = time.monotonic()
 
 
-@command(name="log recover", metavars={"out": "FILE"}, more="upright log recover run.mcap -o whole.mcap")
+@command(
+    name="log recover",
+    metavars={"out": "FILE"},
+    helps={"out": "File to write; LOG-recovered.mcap here when omitted."},
+    prepare=lambda typed: {**typed, "out": typed["out"] or Path(f"{Path(typed['log']).stem}-recovered.mcap")},
+    more="upright log recover run.mcap -o whole.mcap",
+)
 @keeps_its_inputs
 def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvaged]:
     """Save the rows of a damaged log, up to its first error, as a valid file.
@@ -143,12 +149,12 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
     log : path
         Log of a run (MCAP), torn or damaged.
     out : path, optional
-        File to write; LOG-recovered.mcap here when omitted.
+        File to write; the rows are only in the answer when omitted.
 
     Returns
     -------
     Answer
-        Of what was kept and what was not.
+        Of what was kept and what was not; `log` is what was kept.
 
     Raises
     ------
@@ -159,12 +165,17 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
     from upright.report.run import recovered_chapter
 
     log = path_of(log, "the log of a run")
-    at = Path(f"{Path(log).stem}-recovered.mcap") if out is None else Path(out)
-    salvaged = recover(log, at)
-    return Answer(salvaged, recovered_chapter(salvaged), [at])
+    salvaged = recover(log, out)
+    return Answer(salvaged, recovered_chapter(salvaged), [] if salvaged.file is None else [salvaged.file])
 
 
-@command(name="log convert", metavars={"out": "FILE"}, more="upright log convert run.mcap -o run.parquet")
+@command(
+    name="log convert",
+    metavars={"out": "FILE"},
+    helps={"out": "File to write; its ending says the format: .csv, .parquet or .mat. LOG.csv here when omitted."},
+    prepare=lambda typed: {**typed, "out": typed["out"] or Path(f"{Path(typed['log']).stem}.csv")},
+    more="upright log convert run.mcap -o run.parquet",
+)
 @keeps_its_inputs
 def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]:
     """Write a run's log as CSV, Parquet or MATLAB file.
@@ -176,7 +187,7 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     log : path
         Log of a run (MCAP).
     out : path, optional
-        File to write; its ending says the format: .csv, .parquet or .mat. LOG.csv here when omitted.
+        File to write; its ending says the format: .csv, .parquet or .mat. The record is only answered when omitted.
 
     Returns
     -------
@@ -192,18 +203,22 @@ def log_convert(log: PathLike, *, out: PathLike | None = None) -> Answer[Record]
     from upright.report.page import Chapter, Part, Points
 
     log = path_of(log, "the log of a run")
-    at = Path(f"{Path(log).stem}.csv") if out is None else Path(out)
-    if at.suffix not in _CONVERTED:
-        raise BadInput(f"a log is converted to a file ending in {', '.join(_CONVERTED)}, got '{os.fspath(at)}'.")
-    check_output(at, log)
+    at = None if out is None else Path(out)
+    if at is not None:
+        if at.suffix not in _CONVERTED:
+            raise BadInput(f"a log is converted to a file ending in {', '.join(_CONVERTED)}, got '{os.fspath(at)}'.")
+        check_output(at, log)
     record = read_log(log).record(counts=True)
-    {".csv": record.to_csv, ".parquet": record.to_parquet, ".mat": record.to_mat}[at.suffix](at)
+    if at is not None:
+        {".csv": record.to_csv, ".parquet": record.to_parquet, ".mat": record.to_mat}[at.suffix](at)
     notes = (Part("Notes", (Points(record.provenance.notes),)),) if record.provenance.notes else ()
     page = Chapter(
-        title=f"{Path(log).name} as {at.name}", verdict=f"{len(record)} rows of {len(record.names) + 1} columns.",
-        parts=notes, numbers={"rows": len(record), "columns": ["t", *record.names], "file": str(at)},
+        title=Path(log).name if at is None else f"{Path(log).name} as {at.name}",
+        verdict=f"{len(record)} rows of {len(record.names) + 1} columns.",
+        parts=notes,
+        numbers={"rows": len(record), "columns": ["t", *record.names], "file": at and str(at)},
     )  # fmt: skip
-    return Answer(record, page, [at])
+    return Answer(record, page, [] if at is None else [at])
 
 
 @command(
