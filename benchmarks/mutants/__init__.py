@@ -26,7 +26,7 @@ from pathlib import Path
 from benchmarks.measure import Line, Target, page
 from benchmarks.mutants.covering import SOURCE, digest, map_of
 from benchmarks.mutants.places import Change, compiles, places
-from benchmarks.mutants.trial import LONGER, SECONDS, Bench, Outcome
+from benchmarks.mutants.trial import KERNEL, LONGER, SECONDS, Bench, Outcome
 from benchmarks.mutants.trying import Kept, said, tried
 
 ROOT = Path(__file__).parents[2]
@@ -57,6 +57,12 @@ def drawn(root: Path, sample: int, seed: int, within: str = "") -> list[Change]:
         if len(found) < sample and compiles(change.applied(sources[path])):
             found.append(change)
     return found
+
+
+def traced(changes: Iterable[Change]) -> set[str]:
+    """Files whose covering tests are asked for."""
+    paths = {change.path for change in changes}
+    return paths | ({KERNEL} if any(Path(path).parent == Path(KERNEL).parent for path in paths) else set())
 
 
 def room(path: str) -> str:
@@ -91,15 +97,15 @@ def run(
     kept = folder or (cache or ROOT / "build") / "mutants"
     harmless = judged(verdicts or JUDGED)
     changes = drawn(ROOT, min(sample, 10) if quick else sample, seed, within)
-    covered = map_of(ROOT, kept, workers, progress)
-    slower = map_of(ROOT, kept, workers, progress, slow=True) if slow else None
+    covered = map_of(ROOT, kept, workers, progress, traced(changes))
     by_slow: list[Outcome] | None = None
     with tempfile.TemporaryDirectory(prefix="upright-mutants-", ignore_cleanup_errors=True) as name:
         benches = [Bench(ROOT, Path(name) / str(i), cache) for i in range(workers)]
         before = [Kept(kept / f"{suite}-{digest(ROOT)}.jsonl") for suite in ("quick", "slow")]
         done = tried(benches, changes, covered, seconds, before[0], progress)
-        if slower is not None:
+        if slow:
             left = [o.change for o in done if not o.noticed and _line(o) not in harmless]
+            slower = map_of(ROOT, kept, workers, progress, traced(left), slow=True)
             by_slow = tried(benches, left, slower, LONGER * seconds, before[1], progress)
     lines = table(done, harmless, by_slow)
     passed = {_line(o): harmless[_line(o)] for o in done if _line(o) in harmless}

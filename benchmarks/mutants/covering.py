@@ -1,23 +1,21 @@
 """Which tests run which lines of the package, and how long they take: quick or slow tests once under `coverage`.
 
-The map is kept in a folder by the text of the tree. For another tree the map that is most like it is brought up to
-date: test files that changed run again, a few files at a time, and lines of the source move with their text, so that
-a map that was interrupted goes on where it stopped. Lines that run when a module is
-imported belong to no test; neither does the text of kernels, which is compiled. For them the tests of the whole
-function stand in, else those of the module, else those of its room.
+Only the files that are changed are traced. The map is kept in a folder by the text
+of the tree and by what is traced, some files of tests at a time, so that one that was interrupted goes on where it
+stopped. Lines that run when a module is imported belong to no test; neither does the text of kernels, which is
+compiled. For them the tests of the whole function stand in, else those of the module.
 """
 
 from __future__ import annotations
 
 import ast
-import difflib
 import hashlib
 import json
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,22 +25,19 @@ from benchmarks.mutants import watch
 SOURCE = "src/upright"
 KEPT = 250
 """Tests kept for a line, the nearest and cheapest."""
-MAPS = 8
-"""Maps kept of other trees."""
 START = 0.02
 """Seconds that the shortest test costs all the same."""
-BATCH, SLOW_BATCH = 12, 8
-"""Files of quick and of slow tests that run before the map is kept."""
+BATCH = 110
+"""Files of tests that run before the map is kept."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Covering:
-    """Seconds of every test that passed; text of every source file, and for its lines the numbers of their tests."""
+    """Seconds of every test that passed, numbers of the tests of each line, and files of tests that ran."""
 
     seconds: dict[str, float]
     tests: list[str]
-    files: dict[str, str]
-    sources: dict[str, str]
+    files: list[str]
     lines: dict[str, dict[int, list[int]]]
 
     def of(self, path: str, first: int, last: int, text: str) -> list[str]:
@@ -51,10 +46,6 @@ class Covering:
         spans = [range(first, last + 1), *_around(text, first), range(1, text.count("\n") + 2)]
         for span in spans:
             if found := {test for line in span for test in own.get(line, ())}:
-                return self._nearest(path, found)
-        for folder in (Path(path).parent, Path(path).parents[1]):
-            beside = [lines for other, lines in self.lines.items() if Path(other).parent == folder]
-            if found := {test for lines in beside for tests in lines.values() for test in tests}:
                 return self._nearest(path, found)
         return []
 
@@ -91,34 +82,24 @@ def _around(text: str, line: int) -> list[range]:
     return [range(span.start + 1, span.stop) for span in sorted(found, key=len)]
 
 
-def map_of(root: Path, folder: Path, workers: int, progress: Callable[[str], None], *, slow: bool = False) -> Covering:
-    """The map of a tree by its quick tests or by its slow ones, made or brought up to date where there is none."""
-    files = {p: _digest(root / p) for p in _listed(root, "tests", "benchmarks")}
-    sources = {p: (root / p).read_text(encoding="utf-8") for p in _listed(root, SOURCE)}
+def map_of(
+    root: Path, folder: Path, workers: int, progress: Callable[[str], None], traced: Collection[str], *,
+    slow: bool = False,
+) -> Covering:  # fmt: skip
+    """The map of some files of a tree by its quick tests or by its slow ones, made or completed where there is none."""
     name = "slow" if slow else "covering"
-    kept = folder / f"{name}-{digest(root)}.json"
+    of = hashlib.sha256(json.dumps(sorted(traced)).encode()).hexdigest()[:8]
+    kept = folder / f"{name}-{digest(root)}-{of}.json"
     folder.mkdir(parents=True, exist_ok=True)
-    maps = sorted(folder.glob(f"{name}-*.json"), key=lambda path: path.stat().st_mtime)
-    for path in maps[:-MAPS]:
-        path.unlink(missing_ok=True)
-    tests = [p for p in files if Path(p).name.startswith("test_")]
-    nothing = Covering(seconds={}, tests=[], files={}, sources={}, lines={})
-    read = [_read(path) for path in ([kept] if kept.exists() else maps[-MAPS:])]
-    old = max(read, key=lambda m: sum(m.files.get(p) == files[p] for p in tests), default=nothing)
-    changed = [p for p in tests if old.files.get(p) != files[p]]
-    if kept.exists() and not changed:
-        return read[0]
-    progress(f"{name} map in {folder}: {len(changed)} of {len(tests)} files of tests run under coverage")
-    whole = moved(old, sources, set(files) - set(changed))
-    ran = {p: digest for p, digest in files.items() if p not in changed}
-    size = SLOW_BATCH if slow else BATCH
-    for batch in [changed[i : i + size] for i in range(0, len(changed), size)] or [[]]:
-        if batch:
-            with tempfile.TemporaryDirectory(prefix="upright-covering-") as place:
-                run_tests(root, Path(place), batch if len(batch) < len(tests) else [], workers, slow=slow)
-                whole = joined(whole, gather(root, Path(place)))
-        ran |= {p: files[p] for p in batch}
-        whole = Covering(seconds=whole.seconds, tests=whole.tests, files=dict(ran), sources=sources, lines=whole.lines)
+    whole = _read(kept) if kept.exists() else Covering(seconds={}, tests=[], files=[], lines={})
+    tests = [p for p in _listed(root, "tests") if Path(p).name.startswith("test_")]
+    left = [p for p in tests if p not in whole.files]
+    if left:
+        progress(f"{name} map in {folder}: {len(left)} of {len(tests)} files of tests run, {len(traced)} files traced")
+    for batch in [left[i : i + BATCH] for i in range(0, len(left), BATCH)]:
+        with tempfile.TemporaryDirectory(prefix="upright-covering-") as place:
+            run_tests(root, Path(place), batch, workers, traced, slow=slow)
+            whole = joined(whole, gather(root, Path(place)), batch)
         _write(kept, whole)
     return whole
 
@@ -129,9 +110,14 @@ def digest(root: Path) -> str:
     return hashlib.sha256(json.dumps(texts).encode()).hexdigest()[:16]
 
 
-def run_tests(root: Path, folder: Path, tests: Iterable[str], workers: int, *, slow: bool = False) -> None:
-    """Run quick or slow tests with their lines and outcomes written to a folder."""
-    environment = dict(os.environ) | {watch.REPORT: str(folder / "report.jsonl"), watch.LINES: str(folder / "lines")}
+def run_tests(
+    root: Path, folder: Path, tests: Iterable[str], workers: int, traced: Collection[str], *, slow: bool = False
+) -> None:
+    """Run quick or slow tests with the lines they run in some files, and their outcomes, written to a folder."""
+    environment = dict(os.environ) | {
+        watch.REPORT: str(folder / "report.jsonl"), watch.LINES: str(folder / "lines"),
+        watch.TRACED: os.pathsep.join(str(root / path) for path in traced),
+    }  # fmt: skip
     (folder / "lines").mkdir()
     (folder / "report.jsonl").touch()
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "benchmarks.mutants.watch"]
@@ -169,40 +155,18 @@ def gather(root: Path, folder: Path) -> Covering:
     for path, own in lines.items():
         for line, found in own.items():
             own[line] = sorted(set(found), key=lambda i, path=path: cost(path, tests[i], seconds[tests[i]]))[:KEPT]
-    return Covering(seconds=seconds, tests=tests, files={}, sources={}, lines=lines)
+    return Covering(seconds=seconds, tests=tests, files=[], lines=lines)
 
 
-def moved(old: Covering, sources: Mapping[str, str], same: set[str]) -> Covering:
-    """A map for changed sources: lines that still stand in them, and tests of files that are the same."""
-    keep = {i for i, test in enumerate(old.tests) if test.partition("::")[0] in same and test in old.seconds}
-    lines: dict[str, dict[int, list[int]]] = {}
-    for path, text in sources.items():
-        before = old.lines.get(path, {})
-        if (was := old.sources.get(path)) is None:
-            continue
-        a, b = was.splitlines(), text.splitlines()
-        blocks = (
-            [(0, 0, len(a))] if a == b else difflib.SequenceMatcher(None, a, b, autojunk=False).get_matching_blocks()
-        )
-        lines[path] = {
-            to + i + 1: [test for test in before[at + i + 1] if test in keep]
-            for at, to, size in blocks
-            for i in range(size)
-            if at + i + 1 in before
-        }
-    seconds = {test: old.seconds[test] for i, test in enumerate(old.tests) if i in keep}
-    return Covering(seconds=seconds, tests=old.tests, files={}, sources={}, lines=lines)
-
-
-def joined(old: Covering, new: Covering) -> Covering:
-    """Two maps of different tests as one."""
+def joined(old: Covering, new: Covering, files: Iterable[str]) -> Covering:
+    """Two maps of different tests as one; the files of tests of the second."""
     tests = [*old.tests, *new.tests]
     lines = {path: dict(own) for path, own in old.lines.items()}
     for path, own in new.lines.items():
         mine = lines.setdefault(path, {})
         for line, found in own.items():
             mine[line] = [*(i + len(old.tests) for i in found), *mine.get(line, [])]
-    return Covering(seconds=old.seconds | new.seconds, tests=tests, files={}, sources={}, lines=lines)
+    return Covering(seconds=old.seconds | new.seconds, tests=tests, files=[*old.files, *files], lines=lines)
 
 
 def _listed(root: Path, *folders: str) -> list[str]:

@@ -10,14 +10,16 @@ import json
 import os
 import signal
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-REPORT, LINES, WANTED, SECONDS = "MUTANTS_REPORT", "MUTANTS_LINES", "MUTANTS_WANTED", "MUTANTS_SECONDS"
-"""File of the outcomes; folder of the lines that ran; file of the tests wanted, in order; limit of the whole [s]."""
+REPORT, WANTED, SECONDS = "MUTANTS_REPORT", "MUTANTS_WANTED", "MUTANTS_SECONDS"
+"""File of the outcomes; file of the tests wanted, in order; limit of the whole [s]."""
+LINES, TRACED = "MUTANTS_LINES", "MUTANTS_TRACED"
+"""Folder of the lines that ran; the files whose lines they are."""
 MEMORY = 8 * 2**30
 """Bytes that a changed program may fill: a loop without an end fills the memory before its time is over. Address space
 alone is not counted, of which engines of WebAssembly reserve more."""
@@ -70,14 +72,14 @@ class Cost:
 
 
 class Lines:
-    """Which lines of the package each test runs, by `coverage`; one file for each process."""
+    """Which lines of some files each test runs, by `coverage`; one file for each process."""
 
-    def __init__(self, folder: str, source: str) -> None:
+    def __init__(self, folder: str, traced: Sequence[str]) -> None:
         import coverage
 
         file = str(Path(folder) / "lines")
         self.coverage = coverage.Coverage(
-            data_file=file, data_suffix=True, config_file=False, include=[f"{source}/*"], check_preimported=False
+            data_file=file, data_suffix=True, config_file=False, include=traced, check_preimported=False
         )
         self.coverage.start()
 
@@ -126,7 +128,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if (path := asked(REPORT)) and not worker:
         config.pluginmanager.register(Outcomes(path))
     if folder := asked(LINES):
-        config.pluginmanager.register(Lines(folder, str(config.rootpath / "src" / "upright")))
+        config.pluginmanager.register(Lines(folder, os.environ[TRACED].split(os.pathsep)))
     config.pluginmanager.register(Cost())
     if path := asked(WANTED):
         _limit_memory()

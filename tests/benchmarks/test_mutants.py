@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.mutants import drawn, interval, judged, room, table
-from benchmarks.mutants.covering import Covering, joined, moved
+from benchmarks.mutants.covering import Covering, joined, map_of
 from benchmarks.mutants.places import Change, compiles, places
 from benchmarks.mutants.trial import Bench, Outcome
 from benchmarks.mutants.trying import Kept, said, tried
@@ -127,9 +127,8 @@ def covering_of(root, **tests):
     names = [f"tests/test_pkg.py::{name}" for name in tests]
     lines = {line: [i] for i, line in enumerate(tests.values())}
     return Covering(
-        seconds=dict.fromkeys(names, 0.01), tests=names, files={}, sources={"src/pkg.py": HALF},
-        lines={"src/pkg.py": lines},
-    )  # fmt: skip
+        seconds=dict.fromkeys(names, 0.01), tests=names, files=["tests/test_pkg.py"], lines={"src/pkg.py": lines}
+    )
 
 
 @pytest.mark.slow
@@ -196,26 +195,31 @@ def test_a_change_that_never_ends_is_noticed(tree, tmp_path):
     assert (outcome.noticed, outcome.by) == (True, "tests/test_pkg.py::test_half hangs or ends the process")
 
 
-def test_lines_keep_their_tests_when_they_move():
-    tests = ["tests/test_a.py::x", "tests/test_b.py::y"]
-    old = Covering(
-        seconds=dict.fromkeys(tests, 1.0), tests=tests,
-        files={}, sources={"src/upright/p.py": "a\nb\n"}, lines={"src/upright/p.py": {1: [0], 2: [0, 1]}},
-    )  # fmt: skip
-    text = "new\na\nother\nb\n"
-    new = moved(old, {"src/upright/p.py": text}, {"tests/test_b.py"})
-    assert new.lines["src/upright/p.py"] == {2: [], 4: [1]}
-    again = Covering(
-        seconds={"tests/test_a.py::z": 1.0}, tests=["tests/test_a.py::z"], files={}, sources={},
-        lines={"src/upright/p.py": {2: [0]}},
-    )  # fmt: skip
-    both = joined(new, again)
-    assert both.of("src/upright/p.py", 2, 2, text) == ["tests/test_a.py::z"]
-    assert both.of("src/upright/p.py", 4, 4, text) == ["tests/test_b.py::y"]
-    # brought up to date once more, where a test of before has gone and its file is the same
-    assert moved(both, {"src/upright/p.py": text}, {"tests/test_a.py"}).seconds == again.seconds
+@pytest.mark.slow
+def test_a_map_names_the_tests_that_run_a_line_of_a_file_that_is_traced(tree, tmp_path):
+    """`half` divides in its second line, `spare` in its sixth; a test that fails in any case maps nothing."""
+    pytest.importorskip("coverage")
+    (tree / "src/other.py").write_text("import pkg\n", encoding="utf-8")
+    covering = map_of(tree, tmp_path / "maps", 1, lambda _: None, {"src/pkg.py"})
+    assert covering.of("src/pkg.py", 2, 2, HALF) == ["tests/test_pkg.py::test_half"]
+    assert covering.of("src/pkg.py", 6, 6, HALF) == ["tests/test_pkg.py::test_nothing"]
+    assert set(covering.lines) == {"src/pkg.py"}
+    # kept: nothing runs again
+    heard = []
+    assert map_of(tree, tmp_path / "maps", 1, heard.append, {"src/pkg.py"}) == covering
+    assert not heard
+
+
+def test_maps_of_different_tests_are_joined():
+    name = "src/upright/p.py"
+    first = Covering(seconds={"x": 1.0, "y": 1.0}, tests=["x", "y"], files=["a"], lines={name: {2: [0], 4: [1]}})
+    both = joined(first, Covering(seconds={"z": 1.0}, tests=["z"], files=[], lines={name: {2: [0]}}), ["b"])
+    text = "a\nb\nc\nd\n"
+    assert set(both.of(name, 2, 2, text)) == {"x", "z"}
+    assert both.of(name, 4, 4, text) == ["y"]
     # a line that no test runs: those of the whole module stand in
-    assert set(both.of("src/upright/p.py", 1, 1, text)) == {"tests/test_a.py::z", "tests/test_b.py::y"}
+    assert set(both.of(name, 1, 1, text)) == {"x", "y", "z"}
+    assert both.files == ["a", "b"]
 
 
 def test_quick_tests_alone_and_all_tests_have_a_share_each():
