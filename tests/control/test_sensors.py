@@ -217,6 +217,18 @@ def test_scales_are_given_with_what_they_explain_and_the_residuals_of_that():
     assert np.all(better.error > 0)
 
 
+def test_what_no_fit_says_is_known_as_well_as_the_help_of_scales_says():
+    rig = replace(make_rig("furuta", 7), scales=(1.0, 1.1))
+    log = shown_by_encoders(rig, command("furuta"))
+    said = {"m": 0.02, "l": 0.02, "r": 0.02, "J": 0.03, "b": 0.2}
+    known = {name: said[name[0]] for name in make_rig("furuta").plant.names() if name[0] in said} | {"gain": 0.03}
+    words = "2 % of a mass or length, 3 % of an inertia, 20 % of friction, 3 % of the gain"
+    assert words in " ".join(scales.__doc__.split())
+    found, told = scales(make_rig("furuta"), log), scales(make_rig("furuta"), log, known)
+    np.testing.assert_array_equal(found.value, told.value)
+    np.testing.assert_array_equal(found.error, told.error)
+
+
 @pytest.mark.parametrize("samples", [12, 13, 14])
 def test_a_motion_seen_every_third_sample_has_a_row_for_the_last_that_is_begun(samples):
     """As many rows as every third reading of the log has, and the same motion as seen at each."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
@@ -192,6 +194,16 @@ def test_a_twin_s_file_fills_in_what_it_leaves_out_coordinate_by_coordinate(writ
     hardware = written(WHOLE).limits(UNITS, "V", default)
     assert hardware.travel[1] == math.inf  # of hardware nothing is filled in
     assert hardware.saturation == 2.0
+
+
+def test_a_watchdog_and_a_saturation_that_are_left_out_are_those_of_the_page_on_rigs(written):
+    page = (Path(__file__).parents[2] / "docs/howto/rigs.md").read_text(encoding="utf-8")
+    for line, name in (('watchdog = "20 ms"', "watchdog"), ('saturation = "2 s"', "saturation")):
+        value = line.split('"')[1]
+        assert re.search(rf"^{line} .*; {value} where it is left out$", page, re.MULTILINE)
+        without = "\n".join(row for row in WHOLE.splitlines() if not row.startswith(name))
+        with_it = without.replace("[limits]\n", f"[limits]\n{line}\n")
+        assert written(without).limits(UNITS, "V") == written(with_it).limits(UNITS, "V")
 
 
 def test_a_rig_with_a_fit_is_the_same_but_for_its_description(written, tmp_path):

@@ -137,7 +137,8 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     log : Record
         Readings by coordinate [m or rad] and ``u``, from rest, evenly sampled.
     known : mapping of str to float, optional
-        Relative standard error of a parameter, or of ``"gain"``; `KNOWN` where omitted.
+        Relative standard error of a parameter, or of ``"gain"``. Where omitted, 2 % of a mass or length, 3 % of an
+        inertia, 20 % of friction, 3 % of the gain.
     """
     names = tuple(c.name for c in model.plant.coordinates)
     model = model.replace(period=log.period)
