@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from tests.realtime.rigs import BLANK, LAW, RIG, put_out, staged, witnessed
+from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import as_values, of_values
 from upright.logs import read_log
-from upright.realtime.process import run_in_process
-from upright.realtime.session import RunOrder, carry_out
-from upright.rigs import TwinPort
+from upright.realtime.pace import Virtual, WallClock
+from upright.realtime.priority import LoopPriority
+from upright.realtime.process import _child, _deaf, _Window, run_in_process
+from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
+from upright.rigs import Board, Fault, Mode, TwinPort
+from upright.rigs.supervisor import Supervisor
 
 ROOT = Path(__file__).parents[2]
 PARENT = """
@@ -273,3 +280,149 @@ def test_the_kernel_has_been_told_to_end_the_loop_with_its_parent():
     told = "signal = ctypes.c_int(); ctypes.CDLL(None).prctl(2, ctypes.byref(signal)); print(signal.value)"
     ran = subprocess.run([sys.executable, "-c", f"{asked}; {told}"], capture_output=True, text=True, check=True)
     assert int(ran.stdout) == signal.SIGTERM
+
+
+def test_a_parent_is_missed_when_it_has_not_looked_for_two_seconds():
+    """As docs/howto/rigs.md says; in eighths of a second, which are exact."""
+    looks, now = SimpleNamespace(value=0), [100.0]
+    deaf = _deaf(looks, lambda: now[0])
+    for _ in range(5):
+        looks.value += 1
+        assert not deaf()
+        now[0] += 2.0
+        assert not deaf()
+    now[0] += 0.125
+    assert deaf()
+    looks.value += 1
+    assert not deaf()
+
+
+def memory():
+    """What parent and child share, with room for eight readings and a phase of 200 letters."""
+    return multiprocessing.RawArray("d", 17), multiprocessing.RawArray("c", 201)
+
+
+def test_the_state_that_the_parent_sees_is_the_one_that_the_child_put_there():
+    shared = memory()
+    child, parent = _Window(*shared), _Window(*shared)
+    states = [
+        RunState(phase="testing: a small pulse"),
+        RunState(phase="running", time=1.5, tick=7, late=2, mode=Mode.HOST, faults=Fault.STOP | Fault.LINK,
+                 command=-0.25, applied=-0.125, readings=(0.5, -0.75)),
+        RunState(phase="running", time=2.5, tick=8, mode=Mode.MCU, readings=tuple(0.5 * k for k in range(8))),
+        RunState(phase="running", readings=(1.0,)),
+        RunState(phase="w" * 200),
+    ]  # fmt: skip
+    for state in states:
+        child.put(state)
+        assert parent.get() == state
+    child.put(RunState(phase="l" * 250))
+    assert parent.get().phase == "l" * 200
+
+
+def test_a_state_that_is_being_written_is_awaited():
+    """Its first number is odd meanwhile, and another one when it was written between two looks."""
+    shared, phase = memory()
+    _Window(shared, phase).put(RunState(phase="running", tick=7))
+
+    class Writing:
+        """Numbers that are being written at the first look and have changed once more at the next."""
+
+        numbers = iter((1.0, 1.0, 2.0, 4.0, 4.0, 4.0))
+
+        def __getitem__(self, _):
+            return next(self.numbers)
+
+        def __iter__(self):
+            return iter(shared)
+
+    assert _Window(Writing(), phase).get().tick == 7
+    assert next(Writing.numbers, None) is None
+
+
+def anywhere(port):
+    """A stage that starts where it is, without a bank of filters."""
+    whole = staged(port)
+    duty = replace(whole.supervisor.duty, near=math.inf, watch=False)
+    return replace(whole, supervisor=Supervisor(Board(port), duty))
+
+
+def child(folder, monkeypatch, *, make=None, parent=None, stop=0, paced=False):
+    """Answer of a loop's process that is this one, the signals that it turned, and the pace that it took."""
+    said, turned, paces = [], {}, []
+    pipe = SimpleNamespace(send=said.append, close=lambda: said.append("closed"))
+    run = RunOrder(
+        make=make or partial(anywhere, TwinPort(RIG)), law=as_values(LAW), seconds=5 * RIG.period,
+        log=folder / "run.mcap", check=False, zero=False, fifo=False,
+    )  # fmt: skip
+
+    def carried(order, *, pace, **more):
+        return carry_out(order, pace=lambda about: paces.append(pace(about)) or (Virtual(), paces[-1][1]), **more)
+
+    standing = LoopPriority(priority="ordinary", locked=True, warning="Buy a clock.")
+    monkeypatch.setattr("signal.signal", turned.setdefault)
+    for name, stand_in in (("step_forward", lambda fifo: standing), ("_end_with_parent", lambda: None),
+                           ("carry_out", carried)):  # fmt: skip
+        monkeypatch.setattr(f"upright.realtime.process.{name}", stand_in)
+    shared, flags = memory(), [SimpleNamespace(value=stop), SimpleNamespace(value=0)]
+    _child(os.getppid() if parent is None else parent, run, *shared, *flags, pipe, paced)
+    return said, turned, paces
+
+
+def test_a_loop_answers_with_its_end_and_leaves_ctrl_c_to_its_parent(tmp_path, monkeypatch):
+    said, turned, paces = child(tmp_path, monkeypatch)
+    assert isinstance(said[0], RunEnd)
+    assert (said[0].ticks, said[0].stopped, said[0].warning) == (5, "", "")
+    assert said[1:] == ["closed"]
+    assert isinstance(paces[0][0], Virtual)
+    assert turned.pop(signal.SIGINT) == signal.SIG_IGN
+    assert turned
+    assert signal.SIG_IGN not in turned.values()
+
+
+@pytest.mark.parametrize("virtual", [True, False])
+def test_a_paced_loop_waits_for_the_clock_on_the_wall_unless_its_rig_has_a_time_of_its_own(
+    tmp_path, monkeypatch, virtual
+):
+    class Port(TwinPort):
+        def open(self):
+            return replace(super().open(), virtual=virtual)
+
+    said, _, paces = child(tmp_path, monkeypatch, make=partial(anywhere, Port(RIG)), paced=True)
+    assert isinstance(paces[0][0], Virtual if virtual else WallClock)
+    assert said[0].warning == "Buy a clock."
+    if not virtual:
+        assert paces[0][0].period == RIG.period
+
+
+def never():
+    raise AssertionError("something was opened")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="ids of processes of POSIX")
+def test_a_loop_whose_parent_is_gone_opens_nothing(tmp_path, monkeypatch):
+    assert child(tmp_path, monkeypatch, make=never, parent=os.getpid())[0] == []
+
+
+def test_a_loop_that_is_asked_to_stop_says_that_it_was_by_hand(tmp_path, monkeypatch):
+    end = child(tmp_path, monkeypatch, stop=1)[0][0]
+    assert (end.stopped, end.ticks, end.faults) == ("Stopped by hand.", 0, Fault.STOP)
+
+
+@pytest.mark.parametrize(
+    ("error", "answer"),
+    [(BadInput("No rig."), BadInput), (RigStopped("No rig."), RigStopped), (UprightError("No rig."), RigStopped),
+     (ValueError("No rig."), str)],
+)  # fmt: skip
+def test_a_loop_that_fails_hands_its_error_over_and_a_bug_as_its_trace(tmp_path, monkeypatch, error, answer):
+    def make():
+        raise error
+
+    said = child(tmp_path, monkeypatch, make=make)[0][0]
+    assert type(said) is answer
+    assert "No rig." in str(said)
+
+
+def test_a_run_that_cannot_be_sent_is_refused_before_a_process_is_started(tmp_path):
+    with pytest.raises(BadInput, match=r"cannot be sent to a process of its own .* run it inline"):
+        run_in_process(order(tmp_path, seconds=lambda: 1.0))
