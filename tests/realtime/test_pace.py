@@ -125,8 +125,13 @@ def test_the_systems_sleep_is_never_early():
     assert min(pace.wait() for _ in range(20)) >= 0
 
 
+def idle():
+    """A tick that has nothing to do."""
+    return (lambda: None), (lambda: None)
+
+
 def test_a_machine_is_measured_and_judged():
-    found = measure(0.5, 200.0, fifo=False)
+    found = measure(0.5, 200.0, fifo=False, make=idle)
     assert found.behind.size == 100
     assert found.behind.min() > 0
     assert found.quantiles["p50"] <= found.quantiles["p99"] <= found.quantiles["max"]
@@ -204,7 +209,7 @@ def test_work_delays_a_tick_as_a_late_wake_up_does():
 @pytest.mark.parametrize(("seconds", "rate"), [(0.09, 100.0), (3601, 100.0), (1.0, 0.9), (1.0, 20_001.0)])
 def test_what_is_no_loop_is_not_measured(seconds, rate):
     with pytest.raises(BadInput, match=r"measured at 1 to 20000 Hz for 0\.1 to 3600 s"):
-        measure(seconds, rate)
+        measure(seconds, rate, fifo=False, make=idle)
 
 
 def test_a_vigil_is_kept_with_fifo_alone():

@@ -16,11 +16,9 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput, UprightError
-from upright.laws import state_feedback
 from upright.realtime.pace import WallClock, vigil_within
 from upright.realtime.priority import LoopPriority, step_forward
 from upright.records import Array
-from upright.rigs.law import RunningLaw
 
 RATES = (10_000, 5_000, 2_000, 1_000, 500, 200, 100)
 """Rates that are spoken of [Hz]."""
@@ -31,12 +29,6 @@ _SHARE = 0.95
 
 Work = tuple[Callable[[], object], Callable[[], object]]
 """What a tick has to do, and what happens between two, in the place of a rig's exchange; the first is timed."""
-
-
-def law_alone() -> Work:
-    """A state feedback on two readings."""
-    law = RunningLaw(state_feedback([1.0, 0.1, 2.0, 0.2], 1e-3, memory=0.5, k_pf=1.0), 1e-3)
-    return lambda: law.step((0.01, 0.02), 0.0), lambda: None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,9 +107,7 @@ class Jitter:
         return " ".join(filter(None, (f"{head}: it would have held {self.rate:g} Hz.", theft, self.standing.warning)))
 
 
-def measure(
-    seconds: float, rate: float = 1000.0, *, fifo: bool = True, make: Callable[[], Work] = law_alone
-) -> Jitter:  # fmt: skip
+def measure(seconds: float, rate: float, *, fifo: bool, make: Callable[[], Work]) -> Jitter:
     """Jitter of a loop of its own process on this machine, now.
 
     Parameters

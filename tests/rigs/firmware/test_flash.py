@@ -68,6 +68,25 @@ def test_without_one_board_nothing_is_started(there, why):
     assert not flasher.calls
 
 
+USB_IDS = {
+    "Arduino SA": 0x2341, "dog hunter AG": 0x2A03, "QinHeng Electronics": 0x1A86,
+    "Future Technology Devices International": 0x0403, "Silicon Labs": 0x10C4,
+}  # fmt: skip
+"""Vendors in the list of http://www.linux-usb.org/usb.ids: both Arduino makers, and the chips of copies and cables."""
+
+
+@pytest.mark.parametrize("vendor", USB_IDS)
+def test_a_mega_is_known_by_the_usb_of_its_makers_and_of_the_chips_on_copies(vendor):
+    done = flashed(Flasher(0, 0), there={"COM1": 0x8086, "COM7": USB_IDS[vendor]})  # Intel's is none
+    assert done.port == "COM7"
+
+
+@pytest.mark.parametrize("vendor", ["QinHeng Electronics", "Future Technology Devices International", "Silicon Labs"])
+def test_a_pico_answers_behind_a_cable_with_one_of_the_three_chips(vendor):
+    """Its own USB is not used: the host is at its UART."""
+    assert module.port_of(board_of("pico"), "", {"COM1": ARDUINO, "COM7": USB_IDS[vendor]}) == "COM7"
+
+
 def test_a_board_that_does_not_answer_is_left_within_seconds():
     flasher = Flasher(1)
     with pytest.raises(RigStopped, match=r"No Arduino Mega 2560 answers at COM3: avrdude: ser_open\(\): can't open"):
