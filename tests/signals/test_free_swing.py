@@ -102,6 +102,51 @@ def test_errors_are_those_that_noise_makes():
     assert (scatter > 0.5).all()
 
 
+def test_a_swing_without_noise_has_the_errors_that_its_resolution_makes():
+    """Rounding to steps of r scatters by r/sqrt(12); from there on by derivatives of the closed form, by hand.
+
+    Least squares about each extreme for time, height and a size of either side; then of the times for their period, and
+    of the heights for what a half swing leaves, centre and dry friction.
+    """
+    A, omega, sigma, r = 0.05, 20.0, 0.6, 1e-4
+    damped = math.sqrt(omega**2 - sigma**2)
+
+    def swings(tau):
+        return np.exp(-sigma * tau) * (np.cos(damped * tau) + sigma / damped * np.sin(damped * tau))
+
+    def scatter(of, at, by):
+        """Covariance of what is fitted to values that scatter by that, each derivative by a central difference."""
+        steps = 1e-6 * np.eye(len(at))
+        J = np.column_stack([(of(at + h) - of(at - h)) / 2e-6 for h in steps]) / np.reshape(by, (-1, 1))
+        return np.linalg.inv(J.T @ J)
+
+    t = np.arange(0.0, 1.5, 4e-3) + 1e-3
+    found = decay(t, A * swings(t), resolution=r)
+    n = found.t.size
+    times, heights = math.pi / damped * np.arange(1, n + 1), []
+    np.testing.assert_allclose(found.t, times, rtol=0, atol=1e-6)
+    errors = []
+    for at in times:
+        near = t[np.abs(t - at) <= 0.35 * math.pi / damped]
+        size = float(A * swings(at))
+        heights.append(size)
+
+        def about(p, near=near, size=size):
+            tau = near - p[0]
+            return p[1] + np.where(near < p[0], p[2], p[3]) * (swings(tau) - 1) * size
+
+        errors.append(np.sqrt(np.diag(scatter(about, np.array([at, size, 1.0, 1.0]), r / math.sqrt(12)))[:2]))
+    errors = np.array(errors)
+    period = scatter(lambda p: p[0] + p[1] * np.arange(n), np.array([times[0], math.pi / damped]), errors[:, 0])[1, 1]
+    fitted = np.array([heights[0], math.exp(-math.pi * sigma / damped), 0.0, 0.0])
+    covariance = scatter(lambda p: recursion(p, found.maximum), fitted, errors[:, 1])
+    sigma_error = math.sqrt(covariance[1, 1]) / fitted[1] * damped / math.pi
+    omega_error = damped / omega * damped**2 / math.pi * math.sqrt(period)
+    assert found.delta_error == pytest.approx(math.sqrt(covariance[3, 3]), rel=1e-3)
+    assert found.sigma_error == pytest.approx(sigma_error, rel=1e-3)
+    assert found.omega_error == pytest.approx(math.hypot(omega_error, sigma / omega * sigma_error), rel=1e-3)
+
+
 def test_two_modes_are_not_taken_for_one_swing():
     t = np.arange(0, 3, 2e-3)
     y = np.exp(-0.3 * t) * (np.cos(20 * t) + 0.9 * np.cos(47 * t))
