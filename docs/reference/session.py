@@ -69,7 +69,7 @@ up.frequency(rig="furuta", seed=1)
 up.plan_inertias(rig="torsional")
 
 # %% loadings
-up.loadings(twin="torsional", seed=1)
+up.loadings(rig="torsional", seed=1)
 
 # %% Pendulum
 rod = up.Pendulum(m_p=0.22, l_cg=0.2, J_p=2e-3, b_2=2e-4)

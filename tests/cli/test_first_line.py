@@ -207,10 +207,10 @@ def test_python_shows_the_line_before_the_title(tmp_path):
 
 @pytest.mark.slow
 def test_added_masses_on_a_twin_begin_with_simulated(tmp_path):
-    done = upright("loadings", "--twin", "rectilinear", "--seed", 4, "-o", tmp_path)
+    done = upright("loadings", "--rig", "rectilinear", "--seed", 4, "-o", tmp_path)
     assert first_line(done.stdout) == "SIMULATED: no rig was driven."
     assert first_line(done.stdout) in (tmp_path / "report.html").read_text(encoding="utf-8")
-    told = json.loads(upright("loadings", "--twin", "rectilinear", "--seed", 4, "--json").stdout)
+    told = json.loads(upright("loadings", "--rig", "rectilinear", "--seed", 4, "--json").stdout)
     assert told["first_line"] == first_line(done.stdout)
 
 

@@ -31,7 +31,7 @@ def logs(tmp_path_factory) -> Path:
 
 @pytest.mark.slow
 def test_the_twin_is_weighed_and_its_logs_tell_the_same(tmp_path, monkeypatch):
-    outcome = upright("loadings", "--twin", "rectilinear", "--seed", 4, "-o", tmp_path / "out")
+    outcome = upright("loadings", "--rig", "rectilinear", "--seed", 4, "-o", tmp_path / "out")
     assert outcome.exit_code == 0, outcome.stderr
     assert "true value of the twin" in outcome.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -39,7 +39,7 @@ def test_the_twin_is_weighed_and_its_logs_tell_the_same(tmp_path, monkeypatch):
     assert "http://" not in page.replace("http://www.w3.org", "")
     shown = next(line for line in outcome.stdout.splitlines() if line.strip().startswith("upright loadings"))
     monkeypatch.chdir(tmp_path / "out")
-    first = json.loads(upright("loadings", "--twin", "rectilinear", "--seed", 4, "--json", "-o", "again").stdout)
+    first = json.loads(upright("loadings", "--rig", "rectilinear", "--seed", 4, "--json", "-o", "again").stdout)
     second = json.loads(upright(*shlex.split(shown)[1:], "--json").stdout)
     # the same logs; the twin also knows how exact its masses are, which weighs the loadings a little differently
     assert second["k"]["value"] == pytest.approx(first["k"]["value"], rel=2e-3)

@@ -128,7 +128,7 @@ def elsewhere(tmp_path, monkeypatch):
         (lambda: up.plan_inertias(tolerance=-0.01), "tolerance needs a share"),
         (lambda: up.plan_inertias(target=0.5, runs=3), "target needs a share"),
         (lambda: up.plan_inertias(out="plan.pdf"), "a picture is a file ending in"),
-        (lambda: up.loadings(twin="rectilinear", added="1 kg"), "takes no logs"),
+        (lambda: up.loadings(rig="rectilinear", added="1 kg"), "takes no logs"),
         (lambda: up.chance(FURUTA, [0, 0, 0, 0], speed="fast"), "velocities come from"),
         (lambda: up.chance(FURUTA, [0, 0, 0, 0], seconds=0.0), "more than 0 and at most 120 s, got 0 s"),
         (lambda: up.chance(FURUTA, [0, 0, 0, 0], seconds=120.1), "at most 120 s, got 120.1 s"),

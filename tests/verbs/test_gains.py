@@ -28,6 +28,17 @@ def test_gains_are_an_array_a_triple_and_a_table():
     assert (list(table.index), list(table.columns), table.loc["F", "v"]) == (["F"], ["x", "v"], K[0, 1])
 
 
+def test_gains_of_a_loop_that_is_not_stable_begin_with_a_warning():
+    """A pole on the border does not decay either; z = e^(s T) maps the left half-plane onto the unit disk."""
+    warned = "Warning: this loop is not stable."
+    assert all(up.place(MODEL, poles).sentence.startswith(warned) for poles in ("1, -4", "0, -4", "2+-1j"))
+    assert "requested 2±1j." in up.place(MODEL, "2+-1j").sentence
+    assert not up.place(MODEL, "-1, -4").sentence.startswith(warned)
+    sampled = MODEL.to_sampled(0.1)
+    assert up.place(sampled, np.exp(0.1 * np.array([1.0, -4.0]))).sentence.startswith(warned)
+    assert not up.place(sampled, np.exp(0.1 * np.array([-1.0, -4.0]))).sentence.startswith(warned)
+
+
 def test_weights_are_a_diagonal_a_matrix_or_a_text():
     full = up.lqr(MODEL, np.diag([1.0, 3.0]), [[2.0]]).K
     for Q, R in (([1.0, 3.0], 2.0), ("1, 3", [2.0]), ("1, 3", "2")):
@@ -102,6 +113,11 @@ def test_a_file_is_no_folder_for_a_laboratory(tmp_path):
 def test_the_former_name_of_a_faulty_encoder_means_the_same_and_warns():
     with pytest.warns(DeprecationWarning, match="fault="), pytest.raises(up.BadInput, match=r"got '-100\.1'"):
         up.swing_up(lie={"theta": -100.1})
+
+
+def test_the_former_name_of_a_twin_to_weigh_means_the_same_and_warns():
+    with pytest.warns(DeprecationWarning, match="rig="), pytest.raises(up.BadInput, match="got 'pendulum'"):
+        up.loadings(twin="pendulum")
 
 
 def test_the_former_name_of_nonideal_rigs_means_the_same_and_warns():

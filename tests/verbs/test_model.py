@@ -34,7 +34,7 @@ def test_a_loading_for_each_log_is_needed():
     with pytest.raises(BadInput, match="1 logs came with 0"):
         loadings(swinging(400.0, 0.8))
     with pytest.raises(BadInput, match="takes no logs"):
-        loadings(swinging(400.0, 0.8), twin="rectilinear")
+        loadings(swinging(400.0, 0.8), rig="rectilinear")
 
 
 def test_a_plan_is_as_exact_as_a_straight_line_can_be():

@@ -1,4 +1,4 @@
-"""What a fit percent is, and what an equation without physics reaches of processes whose best prediction is known."""
+"""What a fit percent is, and what a black-box (ARX) baseline reaches of processes whose best prediction is known."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def weigh_logs(
 def weigh_twin(kind: str, seed: int, folder: Path | None) -> tuple[Loadings, Chapter]:
     """The same of a twin that is stepped here; its logs go into the folder, where one is named."""
     if kind not in BODIES:
-        raise BadInput(f"--twin is {' or '.join(BODIES)}, got '{kind}'.")
+        raise BadInput(f"--rig is {' or '.join(BODIES)}, got '{kind}'.")
     result = measure_body(drawn_twin(seed, kind))
     column = next(iter(result.logs.values())).outputs[0]
     result = result if folder is None else result.written(folder)

@@ -206,7 +206,7 @@ def _predicts(evidence: Evidence) -> Judgement:
     beaten = _beaten(evidence.runs)
     if beaten:
         notes.append(
-            f"An equation without physics, fitted to the same runs, predicts better ({', '.join(beaten)}), so the "
+            f"A black-box (ARX) baseline, fitted to the same runs, predicts better ({', '.join(beaten)}), so the "
             "model misses something that these data show."
         )
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))

@@ -147,7 +147,7 @@ class RunScore:
     Scores count from `score_from` seconds after the first sample on.
     `naive` is the fit percent that holding the measured speed reaches from the same restarts, empty for a free run: a
     horizon at which the model is hardly better tells nothing about the model.
-    `black_box` is the fit percent that a linear equation without physics reaches, fitted to the same runs; empty for
+    `black_box` is the fit percent that a black-box (ARX) baseline reaches, fitted to the same runs; empty for
     a run that was fitted, and where none was like it.
     `adapted` names what was estimated from the run itself: a prediction that chose its own gain is less of one.
     `offer` is a factor of the run's own that would mend a prediction which falls short.

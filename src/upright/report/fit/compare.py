@@ -28,7 +28,7 @@ BLACK_BOX = "black box"
 
 @dataclass(frozen=True, kw_only=True)
 class ComparedRun:
-    """One run, predicted by every fit and by an equation without physics, over the same samples.
+    """One run, predicted by every fit and by a black-box (ARX) baseline, over the same samples.
 
     `fitted_by` names fits to which it was fitted, so that theirs is no prediction.
     """

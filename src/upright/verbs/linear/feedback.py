@@ -176,7 +176,19 @@ def place(model: LinearForm, poles: str | ArrayLike) -> Gains:
     model = _read(model, "place")
     wanted = read_poles(poles) if isinstance(poles, str) else _complex(poles)
     placement = placed(model.A, model.B, wanted)
-    return Gains(K=placement.K, poles=placement.attained, S=None, model=model, sentence=placement.sentence)
+    sentence = " ".join(filter(None, (_unstable(wanted, model.dt), placement.sentence)))
+    return Gains(K=placement.K, poles=placement.attained, S=None, model=model, sentence=sentence)
+
+
+def _unstable(poles: NDArray[np.complex128], period: float | None) -> str:
+    """The warning that a loop with such poles does not come to rest; empty of one that does."""
+    from upright.gains.requests import written
+
+    out = poles[poles.real >= 0] if period is None else poles[np.abs(poles) >= 1]
+    if not out.size:
+        return ""
+    where = "left of 0 1/s" if period is None else "within |z| < 1, since the model is sampled"
+    return f"Warning: this loop is not stable. Its poles must lie {where}; requested {written(out)}."
 
 
 @_model_first

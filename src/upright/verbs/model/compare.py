@@ -1,4 +1,4 @@
-"""Fits, an equation without physics and the measured run side by side: `compare`."""
+"""Fits, a black-box (ARX) baseline and the measured run side by side: `compare`."""
 
 from __future__ import annotations
 

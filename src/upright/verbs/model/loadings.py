@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
+from upright.renamed import renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder_if_given, write_page
@@ -22,18 +23,20 @@ if TYPE_CHECKING:
 
 @command(
     "Model",
-    metavars={"added": "INERTIA", "signal": "COLUMN", "twin": "KIND"},
+    metavars={"added": "INERTIA", "signal": "COLUMN", "rig": "KIND"},
+    names={"rig": "--rig --twin"},
     helps={"added": "What was added, log by log: '1.5 kg', '4e-3 kg m^2', or '2 at 6.5 cm' (500 g each)."},
     defaults={"out": "loadings"},
     more="""
-    upright loadings --twin rectilinear -o out
+    upright loadings --rig rectilinear -o out
     upright loadings bare.csv one.csv two.csv --added "0 kg" --added "0.5 kg" --added "1 kg" --signal x --command u
     """,
 )
+@renamed({"twin": ("rig", lambda value: value)})
 @keeps_its_inputs
 def loadings(
     logs: Sequence[Log] | Log | None = None, *, added: Sequence[str] | str | None = None, signal: str | None = None,
-    command: str | None = None,    tolerance: float | str = "0 %", free: bool = False, twin: str | None = None,
+    command: str | None = None, tolerance: float | str = "0 %", free: bool = False, rig: str | None = None,
     seed: int = 0, out: PathLike | None = None, pdf: bool = False,
 ) -> Answer[Loadings]:  # fmt: skip
     """Find stiffness and bare inertia from step responses with known added masses.
@@ -55,7 +58,7 @@ def loadings(
         Standard uncertainty of one added piece, as a share.
     free : bool
         Count swings at zero command only, with the drive silent.
-    twin : str, optional
+    rig : str, optional
         No logs: step a twin, rectilinear or torsional.
     seed : int
         Random seed of the rig model; 0 is nominal.
@@ -81,16 +84,16 @@ def loadings(
 
     at = folder_if_given(out, pdf)
     named = paths(logs)
-    if twin:
+    if rig:
         if named or added:
-            raise BadInput("--twin steps a simulated rig and takes no logs; leave out either.")
-        weighed, page = weigh_twin(twin, seed, at)
+            raise BadInput("--rig steps a simulated rig and takes no logs; leave out either.")
+        weighed, page = weigh_twin(rig, seed, at)
         page = simulated(page)
     else:
         if not named or len(texts(added)) != len(named):
             raise BadInput(
                 f"Every log needs its --added, in the same order: {len(named)} logs came with {len(texts(added))};"
-                ' write --added "0 kg" for the bare one, or try --twin rectilinear.'
+                ' write --added "0 kg" for the bare one, or try --rig rectilinear.'
             )
         records = [(record, path.name) for record, path in map(open_log, named)]
         weighed, page = weigh_logs(
