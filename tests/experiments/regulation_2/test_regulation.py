@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from upright import gains
-from upright.basis import DESCRIBED
+from upright.basis import DESCRIBED, SIMULATED
 from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.regulation_2 import chapter as regulation_page
@@ -19,13 +19,17 @@ from upright.experiments.regulation_2.run import (
     Regulation,
     RegulationRequest,
     _run_attempt,
+    actual_start,
     identify_make,
+    request_for,
     run_regulation,
+    scored,
 )
+from upright.experiments.stand.stand import StandRun
 from upright.experiments.stand.twin import TwinStand
 from upright.rig import Rig
 from upright.rig.completion import completed
-from upright.rig.makes import hardware_of_make, make_of_rig, make_rig
+from upright.rig.makes import MAKES, hardware_of_make, make_of_rig, make_rig
 from upright.rig.variation import allowed
 
 
@@ -165,7 +169,7 @@ def test_without_a_rig_nothing_is_run(tmp_path):
 def predicted(tmp_path_factory):
     """Set 2 on an exactly known model, let go at pi/20 with 0.25 rad/s; nothing is run."""
     poles = {"set 2": RegulationRequest().poles["set 2"]}
-    wish = RegulationRequest(poles=poles, draws=4, seconds=1.0, tilt=math.pi / 20, push=0.25)
+    wish = RegulationRequest(poles=poles, draws=4, seconds=1.3, tilt=math.pi / 20, push=0.25)
     known = fit_of(make_rig("linear"), spread=0.0)
     return run_regulation(completed(known), None, 0, tmp_path_factory.mktemp("regulation"), request=wish)
 
@@ -243,3 +247,83 @@ def test_a_cart_whose_friction_is_larger_close_to_rest_hunts():
 def test_what_cannot_be_is_said(call, words):
     with pytest.raises(BadInput, match=words):
         call()
+
+
+@pytest.mark.parametrize(("longer", "slower"), [(1.0, 1.0), (4.0, 2.0)])
+def test_pole_sets_of_a_rig_of_one_s_own_are_as_much_faster_as_it_falls_faster(longer, slower):
+    """A rig of the same material with all lengths four times as long falls half as fast: time goes as their root."""
+    nominal = MAKES["furuta"].rig.plant
+    heavier = {n: getattr(nominal, n) * longer**2 for n in ("J_d", "J_p", "J_a")}
+    rubs = {n: getattr(nominal, n) * longer**2 / slower for n in ("b_1", "b_2")}
+    alike = nominal.replace(l_cg=longer * nominal.l_cg, r=longer * nominal.r, **heavier, **rubs)
+    own = SimpleNamespace(starts_anywhere=False, make=None)
+    asked = request_for(own, SimpleNamespace(plant=alike))
+    printed = RegulationRequest().poles
+    assert list(asked.poles) == [f"set {i} x{1 / slower:.2g}" for i in range(1, 5)]
+    for poles, table in zip(asked.poles.values(), printed.values(), strict=True):
+        np.testing.assert_allclose(poles, np.array(table) / slower, rtol=1e-9)
+    assert (asked.tilt, asked.push, asked.seconds) == (math.radians(4), 0.0, 10.0)  # as a hand brings it up
+    made = request_for(SimpleNamespace(starts_anywhere=False, make=MAKES["furuta"]), SimpleNamespace(plant=alike))
+    assert list(made.poles) == list(printed)
+    assert (made.tilt, made.seconds) == (math.radians(4), 10.0)
+    twin = request_for(SimpleNamespace(starts_anywhere=True, make=None), SimpleNamespace(plant=alike))
+    assert (list(twin.poles), twin.tilt, twin.seconds) == (list(printed), None, 6.0)
+
+
+@pytest.mark.parametrize("make", ["torsional", "rectilinear"])
+def test_what_has_no_pendulum_is_not_regulated(make, tmp_path):
+    with pytest.raises(BadInput, match="nothing to hold upright"):
+        run_regulation(make_rig(make), None, 0, tmp_path)
+
+
+@pytest.mark.parametrize(("overtravel", "lost"), [(True, "ran_out"), (False, "fell")])
+def test_a_run_that_was_ended_is_lost_at_its_end_and_by_what_ended_it(predicted, overtravel, lost):
+    run = predicted.ways[1].run
+    whole = scored(StandRun(trial=run))
+    assert whole.ended is None
+    assert whole.score.held
+    ended = scored(StandRun(trial=run, ended="The supervisor stopped it.", overtravel=overtravel))
+    assert getattr(ended.score, lost) == run.t[-1]
+    assert getattr(ended.score, {"fell": "ran_out", "ran_out": "fell"}[lost]) == math.inf
+    assert ended.score.settled == math.inf
+    assert not ended.score.held
+    assert ended.ended == "The supervisor stopped it."
+
+
+def test_a_hand_lets_go_where_it_was_told_to_half_a_degree_beside(predicted):
+    """pi/20 and 0.25 rad/s, off by 0.01 rad and 0.1 rad/s: normal, from run to run; the cart stands where it stood."""
+    starts = np.array([actual_start(predicted.task, seed) for seed in range(400)])
+    assert not starts[:, :2].any()
+    off = (starts[:, 2:] - [math.pi / 20, 0.25]) / [0.01, 0.1]
+    assert np.abs(off.mean(axis=0)).max() < 4 / math.sqrt(400)
+    assert np.std(off, axis=0) == pytest.approx([1.0, 1.0], abs=4 / math.sqrt(800))
+
+
+def test_a_way_to_the_velocities_is_as_restless_as_its_command_is_from_sample_to_sample(predicted):
+    """Root mean square over the first second, by hand; all start where the same hand let go."""
+    for way in predicted.ways:
+        changes = [(b - a) ** 2 for t, a, b in zip(way.run.t[1:], way.run.u, way.run.u[1:], strict=False) if t <= 1.0]
+        assert way.restless == pytest.approx(math.sqrt(sum(changes) / len(changes)))
+        np.testing.assert_allclose(way.run.x[0] - [0, 0, math.pi, 0], actual_start(predicted.task, 0), atol=1e-9)
+
+
+def test_a_stop_after_a_set_leaves_out_the_others_and_the_ways(tmp_path):
+    """And the share told never goes back; without a word of the start it is the make's."""
+    known, told = completed(fit_of(make_rig("linear"), spread=0.0)), []
+    wish = RegulationRequest(draws=2, seconds=0.1)
+    done = run_regulation(
+        known,
+        TwinStand(rig=make_rig("linear")),
+        0,
+        tmp_path,
+        lambda step, share: told.append(share),
+        lambda: True,
+        wish,
+    )
+    assert [a.name for a in done.attempts] == ["set 1"]
+    assert done.interrupted
+    assert (done.ways, done.ran, done.performed) == ((), done.attempts, SIMULATED)
+    assert done.task.start == (0.0, 0.0, *MAKES["linear"].start)
+    assert told == sorted(told)
+    assert 0.0 <= told[0] <= told[-1] <= 1.0
+    assert (tmp_path / "regulation_set_1.csv").exists()
