@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.experiments.rigs import declared
+from tests.experiments.rigs import declared, made
 from upright.errors import NotIdentifiable
 from upright.experiments import laboratory
 from upright.experiments.stand.experiment import Experiment
@@ -177,3 +177,69 @@ def test_the_cover_names_each_rig_once_with_the_seed_that_makes_it_again(bench, 
     assert dict(cover.facts)["Experiments"] == "none"
     assert "not yet experiments 1, 2, 3." in cover.notes[0]
     assert cover.missing == (("1", "Small 1"), ("2", "Small 2"), ("3", "Small 3"))
+
+
+def test_a_changed_line_or_another_file_is_another_program_and_its_experiments_are_made_again(
+    bench, tmp_path, monkeypatch
+):
+    """Of the files that are read when it runs: code and templates."""
+    room = tmp_path / "upright" / "experiments"
+    room.mkdir(parents=True)
+    monkeypatch.setattr(laboratory, "__file__", str(room / "laboratory.py"))
+
+    def program(**files):
+        for name, text in files.items():
+            (room / name.replace("_", ".")).write_text(text, encoding="utf-8")
+        return laboratory._program.__wrapped__()
+
+    seen = [
+        program(a_py="x = 1"), program(a_py="x = 2"), program(b_md="One."), program(b_md="Two."), program(c_py="x = 2"),
+    ]  # fmt: skip
+    assert len(set(seen)) == 5
+    assert program(d_txt="notes") == seen[-1]
+    (room / "c.py").rename(room / "d.py")
+    assert program() != seen[-1]
+    (room / "d.py").rename(room / "c.py")
+    assert program() == seen[-1]
+    laboratory.run_laboratory((), "", 0, tmp_path)
+    monkeypatch.setattr(laboratory, "_program", lambda: "another")
+    again = laboratory.run_laboratory((), "", 0, tmp_path)
+    assert [t.state for t in again.results] == ["done", "done", "done"]
+
+
+def test_what_to_do_next_is_go_on_another_rig_and_a_log_of_one_s_own(bench, tmp_path):
+    _, trouble = bench
+    whole = laboratory.run_laboratory((), "linear", 4, tmp_path)
+    assert [s.command for s in laboratory.next_steps(whole)] == [
+        "upright lab --rig linear --seed 5", "upright lab --rig furuta", "upright init LOG",
+    ]  # fmt: skip
+    on_paper = laboratory.run_laboratory((), "", 0, tmp_path / "paper")
+    assert [s.command for s in laboratory.next_steps(on_paper)][:2] == [
+        "upright lab --seed 1", "upright lab --rig linear",
+    ]  # fmt: skip
+    trouble["2"] = NotIdentifiable("nothing moves.")
+    failed = laboratory.run_laboratory((), "linear", 4, tmp_path / "failed")
+    assert not failed.interrupted
+    assert laboratory.next_steps(failed)[0].command == f"upright lab --rig linear --seed 4 -o {tmp_path / 'failed'}"
+
+
+def test_a_live_rig_goes_on_with_the_law_that_was_recommended(bench, tmp_path, monkeypatch):
+    """And neither its description nor another version of the program is mistaken for another rig."""
+    live = made(tmp_path)
+    task = laboratory.EXPERIMENTS["2"]
+    page = Chapter(title="Held", verdict="Held.", numbers={"recommended": "set 2"})
+    held = replace(task, on=lambda _: True, live_needs=(), tell=lambda _: (page, True))
+    monkeypatch.setattr(laboratory, "EXPERIMENTS", declared(held))
+    session = laboratory.run_laboratory((), "RIG.toml", 0, tmp_path, live=live)
+    (step,) = laboratory.next_steps(session)
+    law = tmp_path / "2" / "law_regulation_set_2.json"
+    assert step.command == f"upright run --rig {tmp_path / '2' / 'rig.toml'} --law {law} --duration 60"
+    cover = laboratory.book(session, laboratory.date(2006, 6, 18))
+    assert dict(cover.facts)["Rig"] == live.rig.name  # no seed: there is one rig
+    assert dict(cover.facts)["Data"] == live.source
+    assert cover.first_line == live.performed
+    empty = laboratory.book(replace(session, results=[]), laboratory.date(2006, 6, 18))
+    assert dict(empty.facts)["Rig"] == "RIG.toml"
+    monkeypatch.setattr(laboratory, "_program", lambda: "another")
+    again = laboratory.run_laboratory((), "RIG.toml", 0, tmp_path, live=made(tmp_path))
+    assert [t.state for t in again.results] == ["kept"]
