@@ -280,3 +280,63 @@ def test_a_root_locus_of_a_free_mass_is_that_of_its_quadratic(body):
     for k, poles in zip(kp, found, strict=True):
         expected = [*np.roots([1.0, 3 * k * rate, 3 * k]), 0.0, 0.0]
         assert np.sort_complex(poles) == pytest.approx(np.sort_complex(np.array(expected)), abs=1e-5)
+
+
+def test_many_laws_tried_at_once_arrive_and_settle_as_each_does_alone():
+    """A stiff PD arrives, friction holds a soft one off what it was asked for, and the softest where it was."""
+    rig, step = make_rig("rectilinear", 2), 0.01
+    pairs = np.array([(150.0, 15.0), (50.0, 1.5), (0.05, 5e-3)])
+    found = pd.tried(rig, pairs, step)
+
+    def stays(t, x, at):
+        outside = np.flatnonzero(np.abs(x / at - 1) > 0.05)
+        return t[outside[-1] + 1] if outside[-1] + 1 < t.size else math.inf
+
+    for (kp, kd), (arrival, settling) in zip(pairs[:2].tolist(), found.tolist(), strict=False):
+        alone = trial(rig, pd.near_pd(rig, "PD", kp, kd).law, at=AT, start=np.zeros(4),
+                      seconds=pd.DWELL - rig.period, reference=np.full(1, step))  # fmt: skip
+        x = alone.x[:, 2]
+        assert arrival == pytest.approx(stays(alone.t, x, step), abs=1.01 * rig.period)
+        assert settling == pytest.approx(stays(alone.t, x, x[-1]), abs=1.01 * rig.period)
+    assert np.isinf(found).tolist() == [[False, False], [True, False], [True, True]]
+
+
+def test_gains_are_searched_finer_about_the_best_within_the_command_allowed(monkeypatch):
+    """Arrivals as a bowl in the logarithms of kp and of kd/kp: the second grid comes within a step of its bottom."""
+    rig, step, most = make_rig("rectilinear"), 0.01, 5.0
+    tried = []
+
+    def bowl(bottom, rate):
+        def arrivals(_rig, pairs, of):
+            assert of == step
+            tried.append(pairs)
+            off = np.log(pairs[:, 0] / bottom) ** 2 + np.log(pairs[:, 1] / pairs[:, 0] / rate) ** 2
+            return np.column_stack([1.0 + off, 2.0 + off])
+
+        return arrivals
+
+    monkeypatch.setattr(pd, "tried", bowl(0.4 * most / step, 0.03))
+    law, searched = pd.tune(rig, step, most)
+    finer = math.log(1.25 / 0.8) / 8  # of nine
+    assert abs(math.log(law.k_pf / (0.4 * most / step))) <= finer
+    assert abs(math.log(law.K[1] / law.K[0] / 0.03)) <= finer
+    assert law.K.tolist() == [law.k_pf, law.K[1], 0.0, 0.0]
+    assert searched.kp.size == searched.arrival.size == 18 * 18 + 9 * 9
+    np.testing.assert_allclose(searched.settling, searched.arrival + 1.0)
+    first = tried[0]
+    assert (first[:, 0].min() * step / most, first[:, 0].max() * step / most) == pytest.approx((0.03, 1.0))
+    rates = first[:, 1] / first[:, 0]
+    assert (rates.min(), rates.max()) == pytest.approx((8e-3, 0.25))
+    monkeypatch.setattr(pd, "tried", bowl(3.0 * most / step, 0.03))
+    assert pd.tune(rig, step, most)[0].k_pf == pytest.approx(most / step)  # no more than the drive gives
+
+
+def test_of_laws_that_arrive_at_once_the_one_that_rests_soonest_is_taken(monkeypatch):
+    """Where friction keeps every one away none arrives at all."""
+
+    def rests(_rig, pairs, _step):
+        return np.column_stack([np.full(len(pairs), math.inf), np.abs(np.log(pairs[:, 0] / 100.0))])
+
+    monkeypatch.setattr(pd, "tried", rests)
+    law, _ = pd.tune(make_rig("rectilinear"), 0.01, 5.0)
+    assert law.k_pf == pytest.approx(100.0, rel=0.06)
