@@ -428,6 +428,35 @@ def test_what_dir_shows_of_a_fit_is_there_and_documented(fit):
         assert documented or getattr(FitAnswer, name).__doc__, name
 
 
+DIRECTORIES = {
+    "rig": (
+        lambda fit: fit.rig,
+        {"plant", "linear", "plot", "replace", "limit", "period", "counts", "gain", "sources"},
+    ),
+    "record": (lambda fit: SWING, {"t", "signals", "units", "window", "plot", "to_pandas", "from_pandas", "period"}),
+}
+
+
+@pytest.mark.parametrize("kind", DIRECTORIES)
+def test_what_dir_shows_of_a_rig_and_a_record_is_there_and_documented(kind, fit):
+    made, needed = DIRECTORIES[kind]
+    shown = made(fit)
+    assert needed <= set(dir(shown))
+    assert len(dir(shown)) <= 26
+    table = (type(shown).__doc__ or "").replace("Attributes\n", "Parameters\n").partition("Parameters\n")[2]
+    tabled = {name for line in table.splitlines() for name in line.strip().split(" : ")[0].split(", ")}
+    for name in dir(shown):
+        assert hasattr(type(shown), name) or hasattr(shown, name)
+        assert name in tabled or getattr(type(shown), name).__doc__, name
+
+
+def test_a_number_of_a_rig_is_asked_for_as_one_of_a_fit():
+    assert DRIVEN["l_cg"] == RIG.l_cg
+    assert DRIVEN.replace(plant=RIG.replace(l_cg=0.2))["l_cg"] == 0.2
+    with pytest.raises(up.BadInput, match="did you mean 'l_cg'"):
+        DRIVEN["l_c"]
+
+
 def test_what_dir_shows_of_a_design_is_there(design):
     assert {"K", "poles", "law", "rig", "verdict", "plot", "report", "numbers"} <= set(dir(design))
     assert len(dir(design)) <= 25

@@ -33,6 +33,7 @@ PathLike = str | os.PathLike[str]
 LARGEST = 1e30
 SHORTEST = 1e-12  # s; a step of time below that is none: its inverse overflows, and no clock has it
 CSV_MARK = "# upright record"
+_FORMS = ("control", "csv", "mat", "pandas", "parquet", "xarray")
 KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
 
@@ -134,6 +135,13 @@ class Record(Shown):
     def _known(name: str, signals: Mapping[str, Array], where: str) -> None:
         if name not in signals:
             raise BadInput(f"The record has no column '{name}', named under {where}: {nearest(name, signals)}")
+
+    def __dir__(self) -> list[str]:
+        forms = [f"{way}_{form}" for way in ("from", "to") for form in _FORMS]
+        return [
+            "animate", "inputs", "names", "outputs", "period", "plot", "provenance", "replace", "signals", "t", "u",
+            "units", "window", "y", *forms,
+        ]  # fmt: skip
 
     def __len__(self) -> int:
         return self.t.size
@@ -378,7 +386,10 @@ class Record(Shown):
         try:
             regular(path)
             content = loadmat(path)
-            return cls.from_mat_variables(content)
+            names = [str(cell.item()) if cell.size else "" for cell in content["names"].ravel()]
+            table: Any = content["signals"]
+            signals = dict(zip(names, table.T, strict=True))
+            return cls.rebuild(content["t"].ravel(), signals, str(content[KEY].item()))
         except KeyError as error:
             raise BadInput(
                 f"'{path}' lacks the variable {error}; for other MATLAB logs use upright.readers.read."
@@ -387,13 +398,6 @@ class Record(Shown):
             if isinstance(error, BadInput):
                 raise
             raise BadInput(f"'{path}' must be a MATLAB file written by upright, but cannot be read: {error}.") from None
-
-    @classmethod
-    def from_mat_variables(cls, content: Mapping[str, Any]) -> Self:
-        """Record of the variables `to_mat` writes."""
-        names = [str(cell.item()) if cell.size else "" for cell in content["names"].ravel()]
-        table = content["signals"]
-        return cls.rebuild(content["t"].ravel(), dict(zip(names, table.T, strict=True)), str(content[KEY].item()))
 
     def to_parquet(self, path: PathLike) -> None:
         """Columns t and signals."""

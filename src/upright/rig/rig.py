@@ -33,6 +33,7 @@ _ENTRIES = {
 class Rig(Shown):
     """A plant with its numbers, and what is known of the drive, the encoders and the servo about it.
 
+    ``rig["l_cg"]`` is a number of its plant [SI].
     What nobody gave is missing: `limit`, `period` and `counts` say in a sentence that they are needed, and a delay, a
     lag, an offset or a converter step that nobody gave is none.
 
@@ -84,6 +85,20 @@ class Rig(Shown):
         if self.scales and len(self.scales) != len(self.plant.coordinates):
             n = len(self.plant.coordinates)
             raise BadInput(f"a rig with {n} coordinates needs {n} scales of its encoders, got {self.scales}.")
+
+    def __dir__(self) -> list[str]:
+        return [
+            "basis", "converter", "counts", "delay", "drive", "gain", "known", "lag", "limit", "linear", "name",
+            "offset", "outputs", "period", "plant", "plot", "replace", "resolution", "sources", "speed_limit",
+            "states", "travel", "twist", "unit",
+        ]  # fmt: skip
+
+    def __getitem__(self, name: str) -> float:
+        """A number of the plant, by its name [SI]."""
+        numbers = self.plant.parameters()
+        if name not in numbers:
+            raise BadInput(f"{self.name} has no parameter '{name}'; {nearest(name, numbers)}")
+        return numbers[name]
 
     @classmethod
     def known(
