@@ -43,7 +43,10 @@ class Covering:
     def of(self, path: str, first: int, last: int, text: str) -> list[str]:
         """Tests that run one of some lines of a file; where there are none, those that stand in for them."""
         own = self.lines.get(path, {})
-        spans = [range(first, last + 1), *_around(text, first), range(1, text.count("\n") + 2)]
+        around = _around(text, first)
+        spans = [*around, range(1, text.count("\n") + 2)]
+        if around and first in around[0]:  # else it ran when the module was imported, by whichever test came first
+            spans.insert(0, range(first, last + 1))
         for span in spans:
             if found := {test for line in span for test in own.get(line, ())}:
                 return self._nearest(path, found)
@@ -72,14 +75,14 @@ def cost(path: str, test: str, seconds: float) -> float:
 
 
 def _around(text: str, line: int) -> list[range]:
-    """Lines of the functions around a line, the innermost first."""
-    found = [
-        range(node.lineno, (node.end_lineno or node.lineno) + 1)
+    """Lines of the bodies of the functions around a line, the innermost first."""
+    bodies = [
+        range(node.body[0].lineno, (node.end_lineno or node.lineno) + 1)
         for node in ast.walk(ast.parse(text))
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
         and node.lineno <= line <= (node.end_lineno or node.lineno)
     ]
-    return [range(span.start + 1, span.stop) for span in sorted(found, key=len)]
+    return sorted(bodies, key=len)
 
 
 def map_of(

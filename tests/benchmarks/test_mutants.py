@@ -214,12 +214,24 @@ def test_maps_of_different_tests_are_joined():
     name = "src/upright/p.py"
     first = Covering(seconds={"x": 1.0, "y": 1.0}, tests=["x", "y"], files=["a"], lines={name: {2: [0], 4: [1]}})
     both = joined(first, Covering(seconds={"z": 1.0}, tests=["z"], files=[], lines={name: {2: [0]}}), ["b"])
-    text = "a\nb\nc\nd\n"
+    text = "def f():\n    b\n    c\n    d\n"
     assert set(both.of(name, 2, 2, text)) == {"x", "z"}
     assert both.of(name, 4, 4, text) == ["y"]
     # a line that no test runs: those of the whole module stand in
     assert set(both.of(name, 1, 1, text)) == {"x", "y", "z"}
     assert both.files == ["a", "b"]
+
+
+def test_a_line_of_a_module_is_covered_by_all_that_run_the_module_and_not_by_who_imported_it():
+    """A module that a function imports runs its own lines, its signatures among them, within one test."""
+    text = "ONE = 1\ndef f(x=2):\n    return x\ndef g():\n    return ONE\n"
+    tests = [f"tests/test_{name}.py::x" for name in ("first", "f", "g")]
+    lines = {1: [0], 2: [0], 4: [0], 3: [1], 5: [2]}
+    made = Covering(seconds=dict.fromkeys(tests, 1.0), tests=tests, files=[], lines={"src/upright/p.py": lines})
+    by = {line: made.of("src/upright/p.py", line, line, text) for line in lines}
+    assert set(by[1]) == set(tests)
+    assert by[2] == by[3] == tests[1:2]
+    assert by[4] == by[5] == tests[2:]
 
 
 def test_quick_tests_alone_and_all_tests_have_a_share_each():
