@@ -209,6 +209,13 @@ def test_a_study_is_read_for_the_run_that_the_log_is(tmp_path):
     assert read_known(str(path), "two.csv")[1].drive is None
 
 
+def test_a_column_that_measures_a_sum_is_not_read_as_a_coordinate(tmp_path):
+    path = tmp_path / "study.toml"
+    both = STUDY.replace('column = "b"', 'column = "b"\nexpression = "x_2 - x_1"')
+    path.write_text(both, encoding="utf-8")
+    assert set(read_known(str(path), "three.csv")[1].sensors) == {"x_1"}
+
+
 def test_a_rig_is_known_by_its_plant_s_name_and_by_nothing_else():
     assert read_known("furuta") == (Furuta, Wiring())
     with pytest.raises(BadInput, match="A rig is a plant's name, a study"):

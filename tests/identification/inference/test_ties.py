@@ -64,6 +64,37 @@ def test_a_sum_is_as_sure_as_the_correlation_of_its_parts_says(best: Optimum) ->
     assert not ties(replace(best, covariance=C), shared_estimates(best, (), SearchLog(), profiles=False))
 
 
+@pytest.mark.parametrize(("kept_with", "tied"), [(False, True), (True, False)])
+def test_of_one_at_its_bound_the_correlation_is_that_off_the_bound_with_the_first_states_as_free(
+    kept_with: bool, tied: bool
+) -> None:
+    """Gauss-Newton's matrix is an inverse covariance P, in which both numbers share what the first state leaves open.
+
+    With that state held at a bound of its own, they are correlated by their Schur complement, here -0.9.
+    """
+    asked = rig(Pendulum, TRUE, {"b_2": 6e-4, "b_2c": 2e-4})
+    problem = formulate(asked, [noisy(swing(TRUE, angle=AMPLITUDE, seconds=1.0), 2e-3, seed=3)])
+    size = len(problem.unknowns)
+    assert [u.shared for u in problem.unknowns] == [True, True, *[False] * (size - 2)]
+    alone = np.array([[1.0, -0.9], [-0.9, 1.0]])
+    common = np.array([3.0, -3.0])  # how far a first state off by its own deviation throws either number
+    P = np.eye(size)
+    P[:2, :2] = alone + np.outer(common, common)
+    P[:2, 2], P[2, :2] = common, common
+    scale = np.array([3e-5, 2e-5, *[1e-3] * (size - 2)])
+    P *= np.outer(scale, scale)
+    pinned = np.array([False, True, kept_with, *[False] * (size - 3)])
+    sure = np.diag(np.where(pinned, 0.0, np.diag(P)))
+    made = replace(assess(problem, problem.start), matrix=np.linalg.inv(P), pinned=pinned, covariance=sure)
+    found = ties(made, shared_estimates(made, (), SearchLog(), profiles=False))
+    assert len(found) == tied
+    for tie in found:
+        rho = -9.9 / 10  # (-0.9 - 9)/(1 + 9)
+        assert tie.correlation == pytest.approx(rho)
+        assert tie.factor == pytest.approx(scale[0] / scale[1])
+        assert tie.together.stderr == pytest.approx(math.sqrt(P[0, 0]))  # of the one at its bound nothing scatters
+
+
 def test_a_tie_matters_only_where_the_numbers_are_not_narrow(best: Optimum) -> None:
     estimates = shared_estimates(best, (), SearchLog(), profiles=False)
     wide = {

@@ -61,3 +61,40 @@ def test_components_are_weighed_by_what_is_missed_of_them_and_the_cost_stays():
     weighed = np.sqrt(np.mean(problem.residuals(0, x).reshape(-1, 2) ** 2, axis=0))
     assert weighed[0] == pytest.approx(weighed[1], rel=1e-9)  # all alike now
     assert problem.cost(x) == pytest.approx(cost, rel=1e-9)
+    assert not problem.weigh_components(x)  # and nothing changes any more
+
+
+def test_runs_of_the_same_outputs_share_the_weights_of_their_components_and_what_is_missed_of_all():
+    """Mean squares 1 and 3 times as large, beside each other: each run is weighed by their root mean, 2."""
+    parameters = {n: Parameter(name=n, value=v, estimate=n == "J_1", lower=0.0) for n, v in TRUTH.items()}
+    problem = formulate(
+        GreyBox(plant=PLANT, parameters=parameters, substeps=2), [spin_up(), replace(spin_up(), label="b")]
+    )
+    x = problem.start
+    y = problem.tracks[0].y
+    away = 0.01 * y + 0.05 * (y[:, :1] - y[:, 1:]) * [1, -1]
+    problem.tracks = [
+        replace(track, y=y + math.sqrt(part) * away) for track, part in zip(problem.tracks, (1.0, 3.0), strict=True)
+    ]
+    before = [np.mean(problem.residuals(i, x).reshape(-1, 2) ** 2, axis=0) for i in (0, 1)]
+    assert problem.weigh_components(x)
+    after = [np.mean(problem.residuals(i, x).reshape(-1, 2) ** 2, axis=0) for i in (0, 1)]
+    # encoders round, so that the first motion is missed by a little more than what was added
+    assert after[0] / before[0] == pytest.approx(after[1] / before[1], rel=1e-9)
+    both = np.add(*after)
+    assert both[0] == pytest.approx(both[1], rel=1e-9)
+
+
+def test_where_nothing_or_everything_is_missed_no_component_is_weighed_anew():
+    """A light disk on a stiff shaft runs away in steps of 1 ms."""
+    parameters = {n: Parameter(name=n, value=v, estimate=n == "J_1", lower=0.0) for n, v in TRUTH.items()}
+    problem = formulate(GreyBox(plant=PLANT, parameters=parameters, substeps=2), [spin_up()])
+    x, track = problem.start, problem.tracks[0]
+    light = x - 15.0  # a millionth of its inertia and less, as its logarithm is sought
+    with np.errstate(over="ignore", invalid="ignore"):
+        assert not np.isfinite(problem.residuals(0, light)).all()
+        assert not problem.weigh_components(light)
+    assert problem.tracks[0].missed is None
+    problem.tracks[0] = replace(track, y=problem.simulate(0, x[:, None], track.length)[:, 0, :, 0])
+    assert not problem.weigh_components(x)
+    assert problem.tracks[0].missed is None

@@ -5,6 +5,7 @@ import pytest
 
 from upright.physics import Pendulum, find
 from upright.simulation import simulate
+from upright.study.draft.plausible import implausible
 
 METRE = 226629.0
 
@@ -22,6 +23,38 @@ def test_a_length_that_no_laboratory_has_is_said(drafted, clock, said):
     text, _ = drafted(t=t * clock, theta=pendulum(t))
     assert ("No laboratory rig has l_cg" in text) == said
     assert ("clock" in text) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "few", "some", "many"),
+    [
+        ("m_1", 1e-6, 0.5, 1e3),  # a grain of sand, a cart, a car
+        ("k_1", 1e-3, 400.0, 1e7),  # a hair, a coil spring, the suspension of a lorry
+    ],
+)
+def test_a_mass_and_a_spring_that_stand_on_a_bench_are_told_from_others_and_zero_is_none(name, few, some, many):
+    cart = find("rectilinear-1")
+    assert implausible(cart, {name: some}, scaled_by="") == []
+    assert implausible(cart, {name: 0.0}, scaled_by="") == []
+    for odd in (few, many, -many):
+        (sentence,) = implausible(cart, {name: odd}, scaled_by="the assumed 1 N per volt")
+        assert sentence.startswith(f"No laboratory rig has {name} = ")
+        assert "the clock, or the assumed 1 N per volt is likely" in sentence
+    (alone,) = implausible(cart, {name: many}, scaled_by="")
+    assert "the clock is likely" in alone
+
+
+@pytest.mark.parametrize(
+    ("name", "few", "some", "many"),
+    [
+        ("J_1", 1e-10, 2e-3, 100.0),  # a watch's balance wheel, a brass disk, a car's wheel set
+        ("k_1", 1e-7, 2.0, 1e6),  # a watch's hairspring, a steel rod, a ship's shaft
+    ],
+)
+def test_an_inertia_and_a_torsion_spring_that_stand_on_a_bench_are_told_from_others(name, few, some, many):
+    disk = find("torsional-1")
+    assert implausible(disk, {name: some}, scaled_by="") == []
+    assert all(len(implausible(disk, {name: odd}, scaled_by="")) == 1 for odd in (few, many))
 
 
 def carts(k_2: float, gain: float = 5.0):

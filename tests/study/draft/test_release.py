@@ -71,6 +71,20 @@ def test_a_pendulum_lifted_beside_its_moving_cart_is_released_first(drafted):
     assert release - 0.05 * PERIOD <= study.runs[0].t[0] < release + PERIOD
 
 
+def test_a_pendulum_that_its_cart_swings_up_is_free_from_where_the_hand_let_go_although_it_gains_energy():
+    hand, w, n = lifted(0.5, 0.4, 0.5), 2 * np.pi / PERIOD, 2000
+    release = hand.size * DT
+    t = np.arange(hand.size + n) * DT
+    x = 0.02 * np.sin(w * np.clip(t - release, 0, None))
+    theta = simulate(
+        CartPendulum(m_c=1.0, m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3), {}, [0.0, 0.0, 0.4, 0.0], None, DT, samples=n,
+        substeps=2, held={"x": Held(q=x[hand.size :])},
+    )[:, 2, 0]  # fmt: skip
+    assert np.ptp(theta[-300:]) > 1.5 * np.ptp(theta[:200])
+    free = free_from(t, np.concatenate([hand, theta]), w, swings=float(t[-1]), hinge=x)
+    assert release - 0.05 * PERIOD <= free < release + PERIOD
+
+
 def released(dt, noise, angle, seconds=50.0, seed=3):
     """Time and angle of a pendulum let go at the first sample, and the last second at which it still swings."""
     n = round(seconds / dt) + 1
