@@ -105,6 +105,8 @@ def test_signals_are_chosen_by_name_or_number() -> None:
     assert (one.outputs, one.inputs, one.states) == (("z",), ("v",), ("a", "b", "c"))
     assert np.array_equal(TWO[1, 0].D, [[0.0]])
     assert TWO["z"].inputs == ("u", "v")
+    named = StateSpace(TWO.A, TWO.B, TWO.C, TWO.D, outputs=("y1", "y2"))
+    assert named["y2"].outputs == ("y2",)  # two letters are one name
     assert TWO[["z", 0], :].outputs == ("z", "y")
     assert TWO[1:, "u"].outputs == ("z",)
     assert len(TWO[:4]) == 4

@@ -47,6 +47,7 @@ def test_poles_zeros_damping_and_response_are_python_controls(seed, dt):
     ours, theirs = StateSpace(*square(seed), dt), control.ss(*square(seed), dt or 0)
     np.testing.assert_allclose(by_value(ours.poles()), by_value(theirs.poles()), rtol=1e-9)
     np.testing.assert_allclose(by_value(ours.zeros()), by_value(theirs.zeros()), rtol=1e-6)
+    assert np.all(np.diff(ours.zeros().real) < 1e-9)
     omega = np.geomspace(0.01, 30, 7)
     z = 1j * omega if dt is None else np.exp(1j * omega * dt)
     np.testing.assert_allclose(ours.response(omega), np.moveaxis(theirs(z), -1, 0), rtol=1e-9)
@@ -113,6 +114,29 @@ def test_a_gain_without_states_is_a_model_too():
     static = StateSpace.of(control.ss([], [], [], 3))
     assert static.poles().size == 0
     assert StateSpace([], [], [], [[3.0]]).D == 3.0
+    gains = np.array([[3.0, 1.0]])
+    for D in (gains, gains.T):
+        np.testing.assert_array_equal(StateSpace([], [], [], D).response(7.0)[0], D)
+
+
+def test_names_that_are_not_as_many_as_the_states_are_left_aside():
+    class Named:
+        A, B, C, D, dt = *square(0), None
+        state_labels, input_labels, outputs = ("x", "v"), ["u", "w"], ("y", "z")
+
+    model = StateSpace.of(Named())
+    assert (model.inputs, model.outputs) == (("u", "w"), ("y", "z"))
+    assert model.states == StateSpace(*square(0)).states
+
+
+@pytest.mark.parametrize("period", [None, 0.1])
+def test_a_step_response_is_that_of_a_lag_in_closed_form(period):
+    """T y' + y = K u: y = K (1 - exp(-t/T)); sampled, at each sample."""
+    K, T = 3.0, 0.4
+    model = StateSpace([[-1 / T]], [[K / T]], [[1.0]])
+    t, y = (model if period is None else model.to_sampled(period)).step(2.0, samples=11)
+    assert t == pytest.approx(np.linspace(0.0, 2.0, 11 if period is None else 21))
+    assert y[:, 0] == pytest.approx(K * (1 - np.exp(-t / T)))
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ class StateSpace(Shown):
         return poles[np.lexsort((poles.imag, -growth))]
 
     def zeros(self) -> Roots:
-        """Invariant zeros of a model with as many outputs as inputs [1/s; z of a sampled model].
+        """Invariant zeros of a model with as many outputs as inputs [1/s; z of a sampled model], the rightmost first.
 
         Finite eigenvalues of the pencil ``[[A, B], [C, D]] - s [[I, 0], [0, 0]]`` (Emami-Naeini and Van Dooren,
         Automatica 18, 1982).
