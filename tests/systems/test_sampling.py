@@ -64,6 +64,19 @@ def test_a_body_answers_a_late_command_in_closed_form(delay: float, method: str)
         assert y == pytest.approx(np.where(there, 0.01 / 6 + 0.05 * since + since**2 / 2, 0.0))
 
 
+def test_a_drive_that_lags_gives_less_at_first_and_what_shows_the_command_at_once_shows_the_drive() -> None:
+    """A unit command through 1/(lag s + 1) into an integrator: t - lag (1 - exp(-t/lag)), and its speed beside it."""
+    lag = 0.25
+    model = StateSpace([[0.0]], [1.0], [[1.0], [0.0]], [[0.0], [1.0]]).to_sampled(0.1, lag=lag)
+    x, y = np.zeros(2), []
+    for _ in range(8):
+        y.append(model.C @ x + model.D[:, 0])
+        x = model.A @ x + model.B[:, 0]
+    t = 0.1 * np.arange(8)
+    given = 1 - np.exp(-t / lag)
+    assert np.array(y) == pytest.approx(np.column_stack([t - lag * given, given]))
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

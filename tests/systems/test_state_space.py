@@ -99,6 +99,7 @@ def test_python_control_takes_it_back():
     assert control.ss(*sampled).dt == sampled.to_control().dt == 0.002
     back = StateSpace.of(sampled.to_control())
     assert (back.dt, back.states, back.outputs) == (0.002, sampled.states, sampled.outputs)
+    assert StateSpace.of(control.ss(*square(0), name="cart")).name == "cart"
 
 
 def test_a_model_knows_where_it_holds_and_its_units():
@@ -127,6 +128,7 @@ def test_names_that_are_not_as_many_as_the_states_are_left_aside():
     model = StateSpace.of(Named())
     assert (model.inputs, model.outputs) == (("u", "w"), ("y", "z"))
     assert model.states == StateSpace(*square(0)).states
+    assert model.name == "linear model"
 
 
 @pytest.mark.parametrize("period", [None, 0.1])

@@ -7,13 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.identification.twins import FURUTA, noisy, rig
-from upright.identification import Run
+from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, swing
+from upright.identification import Parameter, Run
 from upright.identification.estimate import identify
 from upright.identification.inference.bands import FRICTION, MANY, of_another_day
-from upright.identification.inference.neglected import OFFSET
+from upright.identification.inference.covariance import assess
+from upright.identification.inference.neglected import OFFSET, consider
 from upright.identification.model.bands import Bands
-from upright.physics import Furuta
+from upright.identification.problem.residuals import formulate
+from upright.identification.search.descent import descend_progressively
+from upright.physics import Furuta, Pendulum
 from upright.simulation import simulate
 
 GUESSES = {"J_d": 0.006, "b_1": 6e-3, "b_1c": 2e-3}
@@ -113,3 +116,25 @@ def test_a_log_of_another_day_has_its_friction_uncertain_unless_many_logs_were_f
     assert not of_another_day(bands, known, same).any()
     many = replace(bands, logs=tuple(f"{k}.csv" for k in range(MANY)))
     assert not of_another_day(many, known, run).any()
+
+
+def test_a_number_is_considered_where_it_takes_its_share_of_the_cost_to_first_order() -> None:
+    """Dry friction is nearly linear in what it does to a short swing: what it leaves says what it takes to first order.
+
+    A swing with a little of it, half of what its model misses being noise.
+    """
+    smooth = {**PENDULUM, "b_2c": 0.0, "b_2q": 0.0}
+    run = noisy(swing({**smooth, "b_2c": 4e-4}, seconds=2.0, initial={"theta": 1.5, "theta_dot": 0.0}), 3e-3, seed=7)
+    problem = formulate(rig(Pendulum, smooth, {"J_p": smooth["J_p"]}), [run])
+    best = assess(problem, descend_progressively(problem, problem.start).x)
+    friction = Parameter(name="b_2c", value=0.0, unit="N m", estimate=True, lower=0.0)
+
+    def taken(share: float, **bounds: float) -> float:
+        considered = consider(best, replace(friction, **bounds), share=share, tolerance=1e-6, limit=40)
+        return 0.0 if considered is None else 1 - considered.leaves
+
+    whole = taken(0.0)
+    assert 0.2 < whole < 0.8
+    assert taken(0.9 * whole) == pytest.approx(whole)
+    assert taken(1.1 * whole) == 0.0
+    assert taken(0.0, lower=-1.0, upper=0.0) == 0.0  # friction that drives is beyond its bounds
