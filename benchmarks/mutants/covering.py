@@ -1,9 +1,9 @@
 """Which tests run which lines of the package, and how long they take: quick or slow tests once under `coverage`.
 
-Only the files that are changed are traced. The map is kept in a folder by the text
-of the tree and by what is traced, some files of tests at a time, so that one that was interrupted goes on where it
-stopped. Lines that run when a module is imported belong to no test; neither does the text of kernels, which is
-compiled. For them the tests of the whole function stand in, else those of the module.
+Only the files that are changed are traced. The map is kept in a folder by the text of the tree and by what is traced,
+some files of tests at a time, so that one that was interrupted goes on where it stopped. Lines that run when a module
+is imported belong to no test, whichever imported it first; neither does the text of kernels, which is compiled. For
+them the tests of the whole function stand in, else those of the module.
 """
 
 from __future__ import annotations
