@@ -12,6 +12,7 @@ from upright.signals.smoothing import (
     acceleration_width,
     dominant_period,
     end_errors,
+    gaussian_noise_gain,
     middle,
     noise_gain,
     savitzky_golay,
@@ -97,6 +98,16 @@ def test_noise_of_an_acceleration_is_that_of_a_parabola(width):
     n = width
     expected = 2 * math.sqrt(180 / (n * (n**2 - 1) * (n**2 - 4)))
     assert noise_gain(width, order=3) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("sigma", [2.0, 5.0, 20.0])
+def test_noise_behind_a_gaussian_is_the_size_of_its_impulse_response(sigma):
+    from scipy.ndimage import gaussian_filter1d
+
+    impulse = np.zeros(401)
+    impulse[200] = 1.0
+    size = np.linalg.norm(gaussian_filter1d(impulse, sigma, order=2, truncate=8.0))
+    assert gaussian_noise_gain(sigma) == pytest.approx(size, rel=1e-3)
 
 
 def test_errors_at_an_end_are_those_of_polyfit():

@@ -155,6 +155,11 @@ def noise_gain(width: int, *, order: int = 4) -> float:
     return 2 * float(np.linalg.norm(_polynomials(width, order)[0][2]))
 
 
+def gaussian_noise_gain(sigma: float) -> float:
+    """The same of the second derivative of a Gaussian of standard deviation `sigma` [samples], some wide."""
+    return float(np.sqrt(3 / (8 * np.sqrt(np.pi)))) * sigma**-2.5
+
+
 def smoothing_width(y: Array, dt: float, period: float, resolution: float) -> int:
     """Samples over which a polynomial of order 4 may be fitted: an eighth of a period, at least 15 steps of motion."""
     width = int(round(period / 8 / dt))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +14,7 @@ from upright.identification import identify
 from upright.physics import CartPendulum, Furuta, Pendulum
 from upright.records import Provenance, Record
 from upright.rig import Rig
+from upright.rig.hardware import Entry
 from upright.study.draft.from_record import study_of_record
 
 
@@ -154,3 +158,18 @@ def test_a_study_of_a_known_rig_has_its_gain_whatever_that_is(gain: float) -> No
     study = study_of_record(record, rig, columns={"drive": "u"})
     assert study.model.parameters["actuator.gain"].value == gain
     assert study.rig.gain == gain
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_study_of_a_known_rig_counts_as_its_encoder_does(sign: int) -> None:
+    """2000 counts a turn, where a draft would begin with another number; one of its own plant's lengths is known."""
+    record = Record(t=T, signals={"theta": np.round(sign * SWING * 2000 / math.tau)}, units={"theta": "counts"})
+    known = Rig.known(Pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3), counts=2000)
+    entry = Entry(value=float(sign), unit="1", source="known")
+    rig = replace(known, hardware=known.hardware.with_entries({"sign.theta": entry}))
+    study = study_of_record(record, rig, ask=["b_2"])
+    run = study.runs[0]
+    y = run.y[:, 0] - np.interp(run.t, T, SWING)
+    assert np.ptp(y) < 1.1 * math.tau / 2000
+    assert run.resolution == (pytest.approx(math.tau / 2000),)
+    assert study.model.parameters["l_cg"].value == 0.3

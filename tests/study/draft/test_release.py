@@ -235,6 +235,9 @@ def test_a_pendulum_let_go_twice_from_upright_is_free_from_where_it_falls():
     assert len(found) == 2
     assert 2.0 - DT <= found[0][0] < 2.0 + 2 * PERIOD  # it lingers before it falls
     assert second - DT <= found[1][0] < second + 2 * PERIOD
+    # each to where the hand comes, or the log ends
+    assert found[0][1] == pytest.approx((200 + 1200) * DT, abs=PERIOD / 4)
+    assert found[1][1] == pytest.approx((theta.size - 1) * DT)
 
 
 @pytest.mark.real_data

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from upright.records import Array
 from upright.signals.regression import LeastSquares
-from upright.signals.smoothing import Motion, noise_gain, savitzky_golay, white_noise
+from upright.signals.smoothing import Motion, gaussian_noise_gain, noise_gain, savitzky_golay, white_noise
 from upright.signals.stretches import stretches
 
 HAND = 0.25
@@ -250,7 +250,7 @@ def _width(x: Array, period: float) -> float:
     sigma = low
     while sigma < high:
         pull = float(np.quantile(np.abs(gaussian_filter1d(x, sigma, order=2, mode="nearest")), 0.99))
-        if SURE * noise * math.sqrt(3 / (8 * math.sqrt(math.pi))) * sigma**-2.5 < HAND * pull:
+        if SURE * noise * gaussian_noise_gain(sigma) < HAND * pull:
             break
         sigma *= 1.2
     return min(sigma, high)
