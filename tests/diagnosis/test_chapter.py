@@ -98,6 +98,8 @@ def test_a_picture_draws_each_panel_with_its_marks_and_spans():
     drawing = finding_figure(finding())
     first, second = drawing.axes
     assert [ax.get_ylabel() for ax in (first, second)] == ["x [mm]", "u [V]"]
+    named = [*(ax.yaxis.label for ax in drawing.axes), *second.get_legend().get_texts()]
+    assert not any(text.get_parse_math() for text in named)  # a dollar in a column's name is a dollar
     (line, mark) = first.get_lines()
     drawn = {tuple(np.round(ln.get_xdata(), 6)): ln for ln in first.get_lines()}
     assert (3.0, 3.0) in drawn  # the mark at 9 s lies outside

@@ -101,5 +101,7 @@ def test_a_sine_that_is_cut_off_is_told_from_one_that_turns(limit):
     assert (low, high) == (-limit, limit)
     inside = np.abs(sine) >= limit
     assert share == pytest.approx(float(inside.mean()), abs=0.05)  # the ends of the record are left out
+    steps = np.repeat([0.0, 1.0, 0.0, -1.0] * 5, T.size // 20)  # commanded so, and not cut off
+    assert clipped(steps, 0.0, inertia=False)[2] == 0
     coarse = np.round(50 * sine)  # turns on a plateau of its converter
     assert clipped(coarse, 1.0, inertia=False)[2] == 0

@@ -24,7 +24,7 @@ from upright.gains import (
     read_off,
 )
 from upright.gains.loop import closed, command_noise, loop_gain
-from upright.gains.velocity import observer
+from upright.gains.velocity import observer, placed_observer
 from upright.physics import CartPendulum, Furuta, chain
 from upright.systems import StateSpace, to_s, to_z
 
@@ -218,6 +218,42 @@ def test_separation_of_observer_and_gains():
     found = np.poly(closed(model, feedback(estimator, K)))
     wanted = np.polymul(np.poly(model.A - model.B @ K), np.poly(estimator.A))
     np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize(("delay", "lag"), [(0.0, 0.0), (1.0, 0.0), (1.7, 0.02)])
+@pytest.mark.parametrize("at_once", [False, True])
+def test_the_error_of_an_observer_dies_out_with_its_poles_whatever_is_commanded(delay, lag, at_once):
+    """Cayley and Hamilton: its samples obey the recurrence whose roots were asked for.
+
+    A state that is forgotten within a sample cannot be traced back, and makes the observer a sample late.
+    """
+    A, B, C = np.array([[1.0, 0.1], [0.2, 0.9]]), np.array([[0.005], [0.1]]), np.array([[1.0, 0.0]])
+    if at_once:
+        A[:, 1] = [0.1, 0.02]  # the second column is a tenth of the first
+    model = StateSpace(A, B, C, dt=0.1)
+    if lag or delay % 1:
+        model = StateSpace([[0.0, 1.0], [2.0, -0.3]], [[0.0], [1.0]], C).to_sampled(0.1, delay, lag)
+    elif delay:
+        model = model.to_sampled(0.1, delay)
+    z = np.array([0.5, 0.3])
+    found = placed_observer(model, z)
+    assert found.name.endswith("a sample late") == (at_once and not lag)
+    x, s, misses = np.zeros(len(model.A)), np.zeros(len(found.A)), []
+    x[:2] = [0.3, -1.0]
+    for k in range(8):
+        y, u = model.C @ x, np.array([math.sin(k)])
+        misses.append((found.C @ s + found.D @ y - x)[:2])
+        s = found.A @ s + found.B @ y + found.E @ u
+        x = model.A @ x + model.B @ u
+    misses = np.array(misses)
+    assert np.abs(misses[0]).max() > 0.1
+    c = np.poly(z)
+    assert c[0] * misses[2:] + c[1] * misses[1:-1] + c[2] * misses[:-2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_observer_needs_an_output_that_shows_every_mode():
+    with pytest.raises(BadInput, match="the outputs do not show the mode at -2 1/s"):
+        placed_observer(linear(np.diag([-1.0, -2.0]), [[1], [1]], [[1, 0]]).to_sampled(0.1), [0.5, 0.3])
 
 
 @pytest.mark.slow
