@@ -107,6 +107,15 @@ def test_a_hand_is_asked_in_the_coordinate_s_unit_and_may_refuse(tmp_path):
     assert checkup.verdict.endswith("Not looked at: x by hand, theta by hand, the drive.")
 
 
+def test_a_rig_is_looked_at_where_it_hangs_and_may_lean_as_it_will(tmp_path, monkeypatch):
+    """Nothing is held upright meanwhile, so that no lean stops what a hand does."""
+    stages = []
+    monkeypatch.setattr(doctor, "stage_of", lambda path, **how: stages.append(stage_of(path, **how)) or stages[0])
+    check_up(rig_file(tmp_path), pulse=False)
+    duty = stages[0].supervisor.duty
+    assert (duty.at, duty.zero, duty.lean, duty.near) == ("hanging", "hanging", math.inf, math.inf)
+
+
 def test_a_stop_that_is_pressed_meanwhile_is_told_instead_of_the_next_channel(tmp_path, wired):
     rigs = []
     wired(rigs.append)
