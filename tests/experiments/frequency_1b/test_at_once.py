@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
 from tests.experiments.rigs import OWN, made
-from upright.errors import BadInput
+from upright.errors import BadInput, NotIdentifiable
+from upright.experiments.frequency_1b import at_once
 from upright.experiments.frequency_1b.at_once import _from_rest, _level, asking, run_at_once
+from upright.experiments.stand.known import Known
 from upright.experiments.stand.live import live_stand
 from upright.experiments.stand.strength import SHARE, STILL
 from upright.experiments.stand.twin import TwinStand
 from upright.progress import silent
+from upright.records import Provenance, Record
 from upright.rig.makes import MAKES, make_rig
 
 LOOSE = """
@@ -116,3 +120,82 @@ def test_a_twin_with_dry_friction_is_identified_on_either_stand(live, tmp_path):
             assert firm[name].interval[0] <= true <= firm[name].interval[1], name
     assert firm
     assert fit.trusted
+
+
+def asked_of(stand, monkeypatch, *, per, fails=False, weighed=()):
+    """All that is asked of a rig whose first coordinate follows the command at once, by `per` rad for its unit."""
+    runs, asked, studies, told = {}, [], {}, []
+
+    def run(_stand, samples, _folder, stem):
+        u = np.array(samples)
+        t = 5.0 + np.arange(u.size) * stand.rig.period
+        columns = {"u_applied": u, "psi": 3.0 + per * u, "theta": 0.0 * u}
+        runs.setdefault(stem, []).append(u)
+        return Record(t=t, signals=columns, provenance=Provenance(file=f"{stem}.mcap"))
+
+    def study(_stand, path, title, runs, *, known):
+        studies[path.parent.name] = (runs, known)
+        return path
+
+    def response(paths, request, folder, *, tell):
+        tell("fitting", 0.5)
+        if fails:
+            raise NotIdentifiable("friction leaves too few frequencies.")
+        return paths, request, folder
+
+    monkeypatch.setattr(type(stand), "run", run)
+    monkeypatch.setattr(type(stand), "ask", lambda _stand, sentence: asked.append(sentence))
+    monkeypatch.setattr(at_once, "write_study", study)
+    monkeypatch.setattr(at_once, "response_of_logs", response)
+    monkeypatch.setattr(at_once, "fit_study", lambda path, tell: (tell("fitting", 1.0), "fit"))
+    done = run_at_once(stand, stand.file.path.parent / "1b", lambda step, share: told.append(share), weighed)
+    assert told == sorted(told)
+    assert 0.0 <= told[0] <= told[-1] <= 1.0
+    return done, runs, asked, studies
+
+
+def test_a_rig_of_any_strength_moves_as_far_as_is_wanted_in_the_end(own, monkeypatch):
+    """Probes of 0.15, 0.4 and 0.8 of what is right show it; each of two periods, the run of eight."""
+    wanted, wave = asking(own).reach[0], asking(own).wave
+    guess = wanted / _level(own, asking(own), SHARE * own.rig.limit)
+    for per in (0.9 * guess, 1.4 * guess):
+        done, runs, asked, _ = asked_of(own, monkeypatch, per=per)
+        (whole,), probes = runs["multisine"], runs["probe"]
+        assert per * np.ptp(whole) / 2 == pytest.approx(wanted)
+        assert [per * np.ptp(u) / 2 / wanted for u in probes] == pytest.approx([0.15 * per / guess, 0.4, 0.8], rel=1e-6)
+        still = math.ceil(STILL / own.rig.period)
+        assert [u.size for u in (*probes, whole)] == [still + 3 * wave.size] * 3 + [still + 9 * wave.size]
+        assert len(asked) == 4
+        assert not any("added masses" in sentence for sentence in asked)
+        assert "probe 3 of 3 follows" in asked[2]
+        assert f"at once follow for {8 * wave.size * own.rig.period:.0f} s" in asked[3]
+        assert done.fit == "fit"
+
+
+def test_no_command_is_more_than_its_share_of_the_limit_nor_three_times_the_one_before(own, monkeypatch):
+    most = SHARE * own.rig.limit
+    _, runs, _, _ = asked_of(own, monkeypatch, per=1e-9)
+    sizes = [np.abs(u).max() for u in (*runs["probe"], *runs["multisine"])]
+    assert max(sizes) <= most * (1 + 1e-12)
+    assert all(b <= 3.0 * a * (1 + 1e-12) for a, b in pairwise(sizes))
+    assert sizes[1] == pytest.approx(min(3.0 * sizes[0], most))
+
+
+def test_what_was_whole_is_fitted_and_the_last_probe_foreseen_while_the_response_is_of_the_run_alone(own, monkeypatch):
+    weighed = (Known(name="J_d", value=0.01, stderr=1e-4),)
+    done, runs, asked, studies = asked_of(own, monkeypatch, per=1.0, weighed=weighed)
+    assert asked[0].startswith("Take the added masses off. Let theta hang at rest, with psi in the middle")
+    size, period = asking(own).wave.size, own.rig.period
+    (fitted, foreseen), known = studies["1b"]
+    assert known == weighed
+    for run, n, log in ((fitted, 8, runs["multisine"][0]), (foreseen, 2, runs["probe"][-1])):
+        last = 5.0 + (log.size - 1) * period
+        assert run["window"] == pytest.approx([last - (n * size - 1) * period, last])
+    assert (fitted["file"], foreseen["file"], foreseen["role"]) == ("multisine.mcap", "probe.mcap", "predict")
+    assert "role" not in fitted
+    ((alone,), known) = studies["response"]
+    assert (alone["file"], alone["window"], known) == ("../multisine.mcap", fitted["window"], weighed)
+    ((path,), request, folder) = done.response
+    assert (path.parent, path.name) == (folder, "study.toml")
+    assert (request.kind, request.hold, request.band) == ("multisine", period, asking(own).band)
+    assert asked_of(own, monkeypatch, per=1.0, fails=True)[0].response is None
