@@ -8,23 +8,30 @@ import pytest
 
 from upright.errors import BadInput
 from upright.records import Record
-from upright.records.columns import bare_name, stated_unit, take_time, time_scale
+from upright.records.columns import ANGLES, LENGTHS, bare_name, stated_unit, take_time, time_scale
+from upright.units import scale
 
 
 @pytest.mark.parametrize(
-    ("name", "scale"),
+    ("name", "seconds"),
     [
         ("t", 1), ("Time", 1), (" TIMESTAMP ", 1), ("tout", 1), ("__time", 1), ("seconds", 1), ("time_s", 1),
         ("time [ms]", 1e-3), ("Time (s)", 1), ("t [ us ]", 1e-6), ("t(\u00b5s)", 1e-6), ("t_\u03bcs", 1e-6),
         ("t [ns]", 1e-9), ("time [min]", 0), ("t_us", 1e-6), ("time_ms", 1e-3),
         ("timestamp_ns", 1e-9), ("t_sec", 1), ("t_x", 0), ("theta", 0), ("theta_s", 0),
         ("Zeit (ms)", 1e-3), ("temps", 1), ("ms", 1e-3), ("\u00b5s", 1e-6), ("s", 0),  # s may be a position
-        ("millis", 1e-3), ("micros()", 1e-6), ("time_millis", 1e-3),
+        ("millis", 1e-3), ("micros()", 1e-6), ("time_millis", 1e-3), ("time [seconds]", 1), ("t (sec)", 1),
+        ("Time [msec]", 1e-3), ("t_usec", 1e-6), ("millis()", 1e-3), ("micros", 1e-6), ("t_seconds", 1), ("sec", 1),
         ("", 0), ("x [ms]", 0), ("t" + " " * 199, 1),
     ],
 )  # fmt: skip
-def test_a_column_is_a_time_by_its_name_and_its_unit(name, scale):
-    assert time_scale(name) == scale
+def test_a_column_is_a_time_by_its_name_and_its_unit(name, seconds):
+    assert time_scale(name) == seconds
+
+
+@pytest.mark.parametrize("unit", [*ANGLES, *LENGTHS])
+def test_units_of_places_are_worth_what_pint_says(unit):
+    assert (ANGLES | LENGTHS)[unit] == pytest.approx(scale(unit), rel=1e-15)
 
 
 @pytest.mark.parametrize(

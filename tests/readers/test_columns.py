@@ -367,6 +367,7 @@ def test_a_command_follows_an_encoder_that_it_resembles(name, x, other, said):
         ([10.5], 10, ""),
         ([9.5], 20, ""),
         ([0, 0, 0, 10.5], 20, ""),
+        ([10.5, 0, 0, 10.5], 20, ""),
     ],
 )
 def test_the_first_three_samples_are_outliers_at_five_times_the_rest(first, n, said):
