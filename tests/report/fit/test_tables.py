@@ -405,3 +405,14 @@ def test_residuals_with_a_memory_are_looked_at_in_fitted_runs_of_twenty_samples(
     steps = [s for s in said(changed(runs={"a": run})) if "not noise" in s]
     assert len(steps) == asks
     assert not asks or "not noise (θ of 'a')" in steps[0]
+
+
+def test_three_residuals_with_a_memory_are_named_and_a_fourth_is_among_others(changed):
+    runs = {}
+    for label, others in (("a", ""), ("b", ""), ("c", ""), ("d", " and others")):
+        off = np.where(np.arange(20) < 10, 1.0, -1.0)
+        runs[label] = RunScore(role="fit", fit_percent={"theta": 90.0}, horizon=None, t=np.arange(20) * 0.1,
+                               y=off[:, None], simulated=np.zeros((20, 1)), measured=("theta",))  # fmt: skip
+        named = ", ".join(f"θ of '{n}'" for n in list(runs)[:3])
+        (step,) = [s for s in said(changed(runs=runs)) if "not noise" in s]
+        assert f"not noise ({named}{others})." in step
