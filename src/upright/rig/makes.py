@@ -289,8 +289,8 @@ def hardware_of_make(rig: Rig) -> Hardware:
 def make_rig(key: str, seed: int = 0) -> Rig:
     """A rig of a make.
 
-    Inertias differ by two percent, springs by four, friction by a seventh, the drive's gain by two; seed 0 is the rig
-    as designed.
+    Inertias differ by two percent, springs by four, an arm by one, friction by a seventh, the drive's gain by two; of a
+    pendulum the rod's length by one, its weight by two in thickness and place; seed 0 is the rig as designed.
 
     Raises
     ------
