@@ -214,7 +214,11 @@ def test_friction_close_to_rest_is_drawn_where_the_fit_is_blind_of_it():
         assert excess.max() <= 0.5
         assert np.mean(excess) == pytest.approx(0.25, abs=3 / math.sqrt(48 * 4000))
         assert abs(np.corrcoef(excess, drawn[c])[0, 1]) < 3 / math.sqrt(4000)
-    assert np.median(drawn["v_1s"]) == pytest.approx(math.sqrt(0.005 * 0.05), rel=0.1)
+    for name, low, high in (("v_1s", 0.005, 0.05), ("v_2s", 0.05, 0.5)):  # m/s and rad/s
+        speeds = drawn[name]
+        assert low <= speeds.min() < speeds.max() <= high
+        scatter = math.log(high / low) / math.sqrt(12)
+        assert np.mean(np.log(speeds)) == pytest.approx(math.log(low * high) / 2, abs=3 * scatter / math.sqrt(4000))
     told = rig.changed(b_1s=1.2 * rig.plant.b_1c, v_1s=0.01)
     kept = allowed(told, 100, seed=2)
     np.testing.assert_allclose(kept["b_1s"] / kept["b_1c"], 1.2)
