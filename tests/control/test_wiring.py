@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import upright as up
 from upright.control.exploration import exploration
-from upright.control.wiring import check_wiring
+from upright.control.wiring import WiringCheck, check_wiring
 
 CART = up.CartPendulum(m_c=0.6, m_p=0.14, l_cg=0.19, J_p=6e-4, b_1=1.2, b_2=3e-5)
 GAIN, PERIOD, SECONDS = 5.25, 1e-3, 12.0
@@ -112,3 +112,39 @@ def test_the_exploration_asks_for_no_more_than_the_rig_may_be_given():
     commands, _ = rule.follow(wild, PERIOD)
     assert np.abs(commands).max() <= RIG.limit
     assert not commands[-200:].any()  # and ends at zero
+
+
+LINES = (100, 200, 250, 256, 300, 360, 400, 500, 512, 600, 720, 1000, 1024, 1250, 1800, 2000, 2048, 2500, 3600, 4000,
+         4096, 5000)  # fmt: skip
+"""Of catalogues: US Digital's E5, Omron's E6B2, CUI's AMT10."""
+
+
+def counted_as(described, true, turns=True, error=1e-4):
+    """What is said of a pendulum's encoder that has other counts than described, the body's as they should be."""
+    scale = true / described
+    found = WiringCheck(
+        names=("x", "theta"), unit="V", described=(1.0, described), turns=(False, turns), moves=1.0, swings=1.0,
+        scale=(1.0, scale), error=(0.0, error * scale),
+    )  # fmt: skip
+    return [what for what, _ in found.wrong]
+
+
+@pytest.mark.parametrize("edges", [1, 2, 4])
+def test_counts_that_encoders_have_are_named_by_the_number_in_their_catalogue(edges):
+    """A scale is taken for the number that it is within 0.5 % of; described is one that lies near none of them."""
+    for lines in LINES:
+        assert counted_as(1100, 1.002 * edges * lines) == [f"theta: counts per turn {edges * lines}, not 1100"]
+
+
+def test_counts_that_no_encoder_has_are_told_as_they_are_seen():
+    assert counted_as(777, 1333.0) == ["theta: counts per turn 1330, not 777"]
+    assert counted_as(777, 4 * 777 * 1.001) == ["theta: counts per turn 3108, not 777"]  # edges counted otherwise
+    assert counted_as(777, 777 / 4) == ["theta: counts per turn 194, not 777"]
+    assert counted_as(3000, 2048.0, turns=False) == ["theta: counts per metre 2050, not 3000"]  # of a rail no table
+    assert counted_as(3000, 1500.0, turns=False) == ["theta: counts per metre 1500, not 3000"]
+    # an error of 1 % leaves two that it may be, and one of 15 % more than anybody wants to read
+    assert counted_as(777, 1010.0, error=0.01) == ["theta: counts per turn 1000 or 1024, not 777"]
+    assert counted_as(300, 2000.0, error=0.15) == ["theta: counts per turn 2000, not 300"]
+    # five percent are borne, and what is less than four standard errors off
+    for true, error, named in ((1045.0, 1e-4, 0), (1060.0, 1e-4, 1), (1060.0, 0.02, 0), (950.0, 1e-4, 1)):
+        assert len(counted_as(1000, true, error=error)) == named

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -183,3 +184,29 @@ def test_a_law_of_several_commands_is_not_taken_for_one_drive():
     made = of_law(law)
     texts = TARGETS["arduino"].write(made, self_test(made), False)
     assert "#error" in texts["law/law.ino"]
+
+
+def set_up(text: str) -> dict[str, str]:
+    """What stands between the braces of each table that the owner of a rig sets."""
+    return dict(re.findall(r"(\w+)\[[^;]*\] = \{(.*?)\};", text))
+
+
+def test_a_cart_s_sketch_has_limits_in_its_metres_and_wires_at_interrupts_of_a_mega():
+    """attachInterrupt() takes 2, 3, 18, 19, 20 and 21 on a Mega, by its reference: three encoders, and no fourth."""
+    law = replace(
+        state_feedback([1.0] * 8, PERIOD), measured=("x", "theta", "x_2", "theta_2"), resolution=[1e-4, 0.0, 2e-4, 0.0],
+        target=[0.0, 3.5, 0.0, 0.0],
+    )  # fmt: skip
+    made = replace(of_law(law), reading_units=("m", "rad", "m", "rad"), command_unit="A")
+    texts = TARGETS["arduino"].write(made, self_test(made), False)
+    found = set_up(texts["law/law.ino"])
+    assert found["TRAVEL"] == "0.3, 0, 0, 0"  # only the driven body has an end
+    assert found["SPEED"] == "3, 40, 3, 40"
+    assert found["START"] == "0.02, 0.2, 0.02, 0.2"
+    assert found["TARGET"] == "0.0, 3.5, 0.0, 0.0"
+    steps = found["STEP"].split(", ")
+    assert [step.startswith("LAW_STEP_") for step in steps] == [True, False, True, False]
+    assert steps[1] == "1 /* FILL IN: reading per count */"
+    assert "LIMIT = 12.0 /* FILL IN */;" in texts["law/law.ino"]
+    assert "largest command [A]" in texts["law/law.ino"]
+    assert set_up(texts["law/board.h"])["ENCODER_PINS"] == "{2, 3}, {18, 19}, {20, 21}, {-1, -1}"
