@@ -190,6 +190,48 @@ def test_gains_that_let_the_model_fall_are_refused_before_arming():
     assert not scene.port._enabled
 
 
+def test_a_law_that_does_nothing_is_refused_with_the_time_in_which_its_model_falls():
+    """Open, the model grows by its unstable pole: e-fold in 1/p."""
+    idle = state_feedback([0.0] * 4, RIG.period)
+    growth = MODEL.poles().real.max()
+    with pytest.raises(RigStopped, match=rf"its model falls, e-fold in {1 / growth:.3g} s; design again"):
+        Scene().started(law=idle)
+
+
+@pytest.mark.parametrize(("share", "starts"), [(0.98, True), (1.02, False)])
+def test_a_law_that_would_begin_with_all_there_is_is_not_started(share, starts):
+    """At rest it answers a tilt by its gain times that; it must leave something of the largest command."""
+    wide = Scene(replace(DUTY, near=math.radians(40), limits=replace(LIMITS, command=2.0)))
+    tilt = share * 2.0 / abs(place(MODEL.A, MODEL.B, POLES).K[0, 2])
+    if starts:
+        wide.started(tilt=tilt)
+        assert [kind for kind, _, _ in wide.told] == ["start"]
+        return
+    with pytest.raises(RigStopped, match=r"would begin with its largest command, -?2 V; bring the rig closer"):
+        wide.started(tilt=tilt)
+    assert wide.told == [("fault", 0.0, False)]
+
+
+SHAFTS = {"torsional": ("rad", "28.6 degrees", "5.73 degrees"), "rectilinear": ("m", "500 mm", "100 mm")}
+
+
+@pytest.mark.parametrize("make", SHAFTS)
+def test_a_free_shaft_is_held_where_it_is_with_all_that_hangs_on_it(make):
+    """Nothing pulls it back to ground: where its driven end is, the other is at rest too."""
+    rig, (_, off, near) = make_rig(make), SHAFTS[make]
+    model, free = rig.linear("rest"), (math.inf, math.inf)
+    law = state_feedback(place(model.A, model.B, [-8.0, -9.0, -10.0, -11.0]).K[0], rig.period, memory=0.5)
+    limits = Limits(travel=free, speed=free, start=free, command=rig.limit)
+    scene = Scene(Duty(limits=limits, model=rig, at="rest", zero="rest", near=0.1, watch=False), rig)
+    scene.beside.prepare()
+    scene.port.hold("rest", [0.3, 0.0, 0.3, 0.0])
+    scene.beside.aim(law)
+    assert scene.beside.target == pytest.approx((0.3, 0.3), abs=2e-3)
+    scene.port.hold("rest", [0.3, 0.0, 0.8, 0.0])
+    with pytest.raises(RigStopped, match=rf"2 is {off} from where it is to be stabilised, .* within {near};"):
+        scene.beside.aim(law)
+
+
 def test_absurd_gains_and_foreign_laws_are_refused():
     with pytest.raises(RigStopped, match="absurd"):
         Scene().started(law=replace(LAW, D=LAW.D * 1e6))
