@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from upright.laws import Law
+from upright.errors import BadInput
+from upright.laws import Law, state_feedback
 from upright.rig.makes import make_rig
 from upright.rigs import Capabilities, Limits
-from upright.rigs.law import RunningLaw, absurdity
+from upright.rigs.law import RunningLaw, absurdity, for_rig
 from upright.rigs.onboard import MEMORIES
 
 PER, LIMIT = 2000.0, 5.0
@@ -108,3 +111,29 @@ def test_a_law_without_a_reference_follows_zero_and_another_one_what_it_is_given
     running = RunningLaw(led, 1e-3)
     assert running.step([0.0, 0.0], reference=0.3) == 0.6
     assert running.followed == 0.3
+
+
+def test_on_a_rig_a_law_is_limited_by_the_narrower_and_puts_out_its_steps():
+    """Counts, delay and steps are the rig's own; a law that was simulated with them brings them along."""
+    law = replace(at_once(1.0), delay=0.5e-3, resolution=1e-3, command_resolution=0.5)
+    for own, limit in ((3.0, 3.0), (7.0, LIMIT)):
+        fitted = for_rig(replace(law, limit=own), ABOUT, FREE, (0.1, 0.2))
+        assert (fitted.limit, fitted.delay, fitted.resolution) == (limit, 0.0, 0.0)
+        assert fitted.command_resolution == ABOUT.step == 10.0 / 32768
+        assert fitted.target.tolist() == [0.1, 0.2]
+    assert for_rig(law, ABOUT, FREE).target == law.target
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (state_feedback([1.0, 0.0], 1e-3), r"bench shows psi, theta and takes one command; this law reads 1 signals"),
+        (Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.ones((2, 2))), r"reads 2 signals and gives 2\."),
+        (replace(at_once(1.0), D=np.ones((1, 2, 2))), "runs one law, and this one is of several lanes"),
+        (replace(at_once(1.0), period=1.002e-3), r"for a period of 1\.002 ms, and bench ticks every 1 ms; design for"),
+    ],
+)
+def test_a_law_of_another_rig_or_of_several_is_refused(law, said):
+    with pytest.raises(BadInput, match=said):
+        for_rig(law, ABOUT, FREE)
+    assert for_rig(replace(at_once(1.0), period=1.0009e-3), ABOUT, FREE)  # clocks that differ by less than 0.1 %

@@ -69,3 +69,26 @@ def test_another_law_is_told_from_it(logged):
 def test_counts_have_to_be_known(logged):
     with pytest.raises(BadInput, match="counts for each"):
         ReplayPort(logged[1], (16_000.0,), 10.0, 1e-3)
+
+
+def test_a_record_stands_still_until_the_power_stage_is_on_and_ends_with_its_last_sample():
+    """Time goes on by the record's clock, here an uneven one, and by its period while the record waits."""
+    t = np.array([5.0, 5.1, 5.3, 5.4])
+    record = Record(t=t, signals={"u": np.zeros(4), "psi": [0.0, 0.26, 0.24, -0.26]}, units={"u": "A"}, inputs=("u",),
+                    outputs=("psi",))  # fmt: skip
+    port = ReplayPort(record, (10.0,), 10.04, 0.1)
+    about = port.open()
+    assert (about.coordinates, about.counts, about.command_unit) == (("psi",), (10.0,), "A")
+    assert (about.steps, about.full_scale, about.period) == (100, pytest.approx(10.0), record.period)
+    assert (about.virtual, about.hardware, about.replayed) == (True, False, True)
+    for waited in (1, 2, 3):
+        assert port.advance() == pytest.approx(5.0 + waited * record.period)
+        assert port.read() == (0,)
+    port.enable(True)
+    shown = [(port.advance(), port.read()) for _ in t]
+    assert [time for time, _ in shown] == pytest.approx(t + 3 * record.period)
+    assert [counts for _, counts in shown] == [(0,), (3,), (2,), (-3,)]  # 2.6, 2.4 and -2.6 to the nearest
+    with pytest.raises(RigStopped, match=r"The record ends after 4 samples\."):
+        port.advance()
+    port.enable(False)
+    assert port.advance() == pytest.approx(5.4 + 4 * record.period)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import struct
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -389,3 +390,49 @@ def test_a_rig_that_cannot_be_is_refused(changed, said):
     given = {"coordinates": ("a", "b"), "counts": (1.0, 1.0), "command_unit": "V", "full_scale": 10.0} | changed
     with pytest.raises(BadInput, match=said):
         SerialRig(FakeBoard(), **given)
+
+
+@pytest.mark.parametrize(("period", "least"), [(None, 0.001), (4e-3, 0.004)])
+def test_a_watchdog_takes_a_tick_of_the_host_to_five_seconds(period, least):
+    """Up to 5000 of its ticks, CEILING_WATCHDOG of firmware/ceilings.h, and no fewer than the host lets pass."""
+    rig = opened(FakeBoard(), **({} if period is None else {"period": period}))
+    rig.clear_fault()
+    for taken in (least, 5.0):
+        assert rig.configure(replace(LIMITS, watchdog=taken)).watchdog == pytest.approx(taken)
+    for refused in (0.9 * least, 5.001):
+        with pytest.raises(RigStopped, match=rf"the watchdog takes {least:g} to 5 s, got {refused:g} s"):
+            rig.configure(replace(LIMITS, watchdog=refused))
+
+
+def test_the_first_firmware_is_refused_by_the_length_of_its_answer():
+    class First(FakeBoard):
+        """Version 1 answers a greeting that it does not know by four bytes."""
+
+        def write(self, data):
+            for kind, sequence, session, _ in self._parser.feed(data):
+                self._replies += pack(kind | 0x80, sequence, session, bytes(4))
+
+    with pytest.raises(RigStopped, match=rf"speaks version 1 of the protocol and this program version {PROTOCOL}; fl"):
+        opened(First())
+
+
+def test_a_line_that_was_closed_is_not_opened_again():
+    rig = opened(FakeBoard())
+    rig.close()
+    with pytest.raises(RigStopped, match="Its line was closed; make the rig anew with another line"):
+        rig.open()
+
+
+@pytest.mark.parametrize(("command", "coordinates", "said"), [
+    (10.01, 2, "the limit on the command is 10.01 V, beyond the converter's 10 V"),
+    (0.9 * 10 / STEPS, 2, "the limit on the command is less than a step of 0.0005 V"),
+    (5.0, 1, "limits are for 1 coordinates, and it has 2"),
+])  # fmt: skip
+def test_limits_that_the_board_cannot_hold_are_refused(command, coordinates, said):
+    board = FakeBoard()
+    rig = opened(board)
+    rig.clear_fault()
+    each = {name: getattr(LIMITS, name)[:coordinates] for name in ("travel", "speed", "start")}
+    with pytest.raises(RigStopped, match=said):
+        rig.configure(replace(LIMITS, command=command, **each))
+    assert not board.sent(Kind.CONFIGURE)
