@@ -73,3 +73,10 @@ def test_numbers_that_stay_within_their_intervals_are_not_bent() -> None:
     assert sharp is not None
     assert set(sharp.bent) == {"k_1", "actuator.gain"}
     assert sharp.sentence.endswith("and moves k_1, actuator.gain out of what the intervals say.")
+    # a number that its bound holds has no interval to leave
+    held = 1e-12 * best.covariance
+    i = next(i for i, u in enumerate(best.problem.unknowns) if u.name == "k_1")
+    held[i] = held[:, i] = 0.0
+    only = lateness(replace(best, covariance=held))
+    assert only is not None
+    assert only.bent == ("actuator.gain",)

@@ -12,8 +12,9 @@ from upright.identification import Parameter, Run
 from upright.identification.estimate import identify
 from upright.identification.inference.bands import FRICTION, MANY, of_another_day
 from upright.identification.inference.covariance import assess
-from upright.identification.inference.neglected import OFFSET, consider
+from upright.identification.inference.neglected import OFFSET, Neglected, consider, with_force
 from upright.identification.model.bands import Bands
+from upright.identification.model.fit import Estimate
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend_progressively
 from upright.physics import Furuta, Pendulum
@@ -138,3 +139,16 @@ def test_a_number_is_considered_where_it_takes_its_share_of_the_cost_to_first_or
     assert taken(0.9 * whole) == pytest.approx(whole)
     assert taken(1.1 * whole) == 0.0
     assert taken(0.0, lower=-1.0, upper=0.0) == 0.0  # friction that drives is beyond its bounds
+
+
+def test_bands_hold_the_mean_square_of_a_force_and_of_what_it_moves() -> None:
+    """A force of 2 +- 0.5 that moves b by 3 and what no band knows: E[f^2] = 2^2 + 0.5^2, and b by 3 all the same."""
+    bands = Bands(quantile=1.6, spreads={}, names=("a", "b"), covariance=np.array([[4.0, 1.0], [1.0, 9.0]]), logs=())
+    force = Neglected(
+        name=OFFSET, size=Estimate(value=2.0, stderr=0.5, interval=(1.0, 3.0), unit="N"), means="", essential=False,
+        intervals={}, names=("b", "c"), moves=np.array([3.0, 7.0]),
+    )  # fmt: skip
+    wider = with_force(bands, force)
+    assert wider.names == ("a", "b", OFFSET)
+    assert wider.covariance.tolist() == [[4.0, 1.0, 0.0], [1.0, 9.0 + 9.0, 6.0], [0.0, 6.0, 4.25]]
+    assert (wider.quantile, wider.logs) == (bands.quantile, bands.logs)
