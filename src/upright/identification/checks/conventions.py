@@ -30,15 +30,12 @@ def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
         return ()
     measured = sorted({c for run in runs for c in run.measured if c not in run.held})
     angles = {c.name for c in rig.plant.coordinates if c.unit == "rad"}
-    driven = any(run.u.size and run.u.any() for run in runs)
     best, changes = declared, ({}, {})
     for signs in itertools.product((1.0, -1.0), repeat=len(measured)):
         for turned in itertools.product((0.0, math.pi), repeat=len(measured)):
             flips = dict(zip(measured, signs, strict=True))
             turns = {c: t for c, t in zip(measured, turned, strict=True) if t and c in angles}
             if len(turns) != sum(1 for t in turned if t) or not (turns or -1.0 in signs):
-                continue
-            if not driven and not turns and all(s < 0 for s in signs):
                 continue
             left = _unexplained(rig, runs, flips, turns)
             if left < CLOSER * best:
