@@ -234,6 +234,16 @@ def test_reasons_are_those_of_the_last_fit_that_was_finished(interrupted):
     assert fit.interrupted is interrupted
 
 
+def test_where_nothing_is_strange_the_first_fit_stands(monkeypatch):
+    monkeypatch.setattr("upright.identification.checks.outliers.outliers", lambda *_: ())
+    first = ended(object())
+
+    def again(kept, near):
+        raise AssertionError("nothing was taken out, so nothing is to be fitted again")
+
+    assert refit_without_outliers(first, rig(Pendulum, PENDULUM, GUESSES), swings(3), again) is first.fit
+
+
 def test_a_fit_without_outliers_is_that_of_the_retained_runs_with_intervals_and_predictions():
     """As if the stretch had been cut out by hand: nothing is left at what the quick look at outliers needed."""
     question, runs = rig(Pendulum, PENDULUM, GUESSES), swings(3)
