@@ -10,7 +10,7 @@ import pytest
 
 from tests.study.draft.test_recognise import col
 from upright.errors import BadInput
-from upright.physics import Coordinate, Joint, Plant
+from upright.physics import Coordinate, Joint, Plant, find
 from upright.quantities import quantity
 from upright.readers import inspect, read
 from upright.study.draft.draft import draft
@@ -297,12 +297,24 @@ class Spring(Plant):
         return T, (p.k + p.n * p.m_p * G * p.l_cg) * q[0] ** 2 / 2, (p.b + p.d * p.l_cg**2) * v[0] ** 2 / 2
 
 
+def swinging(w: float) -> Recognised:
+    return Recognised(plant="own", columns={}, rest={}, drive=None, reversed=False, mirrored=False,
+                      window=(0.0, 9.0), frequency=w, settled=True, doubts=())  # fmt: skip
+
+
+def test_a_plant_of_the_user_s_own_that_slides_starts_from_sizes_that_swing_as_slowly():
+    """Of 1 kg: w^2 = k / m of the spring, a thousandth of critical damping, and two of the weight as dry friction."""
+    w = 4.0
+    asked = starts_hanging(swinging(w), find("rectilinear-2")).guesses
+    assert asked["k_12"] / asked["m_2"] == pytest.approx(w**2)
+    assert asked["c_1"] / (2 * asked["m_2"] * w) == pytest.approx(1e-3)
+    assert asked["f_1c"] == pytest.approx(2e-3 * asked["m_2"] * G)
+
+
 def test_a_plant_of_the_user_s_own_starts_from_sizes_that_swing_as_slowly():
     """Of 1 kg: w^2 = g / l of the weight, k / J of the spring, and a thousandth of critical damping."""
     w = 4.0
-    found = Recognised(plant="spring", columns={}, rest={}, drive=None, reversed=False, mirrored=False,
-                       window=(0.0, 9.0), frequency=w, settled=True, doubts=())  # fmt: skip
-    starts = starts_hanging(found, Spring)
+    starts = starts_hanging(swinging(w), Spring)
     mass, _ = starts.assumed["m_p"]
     asked = starts.guesses
     assert mass == 1.0

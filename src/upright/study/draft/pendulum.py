@@ -194,10 +194,11 @@ def starts_hanging(recognised: Recognised, plant: type[Plant]) -> PendulumStarts
             guesses |= {"b_1": INERTIA[recognised.plant] * 1.0, "b_1c": INERTIA[recognised.plant] * 0.1}
         return PendulumStarts(assumed=assumed, guesses=guesses)
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
-    sizes = {"m": length, "kg m^2": length**2, "N m/rad": (w * length) ** 2}
+    sizes = {"m": length, "kg m^2": length**2, "N m/rad": (w * length) ** 2, "N/m": w**2}
     viscous = {"N m s/rad": 0.002 * w * length**2, "N s/m": 0.002 * w}
     rubbed = {n: viscous[unit] for n in plant.names() if (unit := plant.quantity(n).unit) in viscous}
-    rubbed |= {j.coulomb: 0.002 * G * length for j in plant.joints if j.coulomb}
+    dry = [j.coulomb for j in plant.joints if j.coulomb]
+    rubbed |= {n: 0.002 * G * (1.0 if plant.quantity(n).unit == "N" else length) for n in dry}
     return PendulumStarts(
         assumed=dict.fromkeys(required[:1], (1.0, "MEASURE")),
         guesses={n: sizes.get(plant.quantity(n).unit, 1.0) for n in required[1:]} | rubbed,
