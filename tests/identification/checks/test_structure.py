@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification import GreyBox, Run
-from upright.identification.checks.structure import missing_numbers
+from upright.identification.checks.structure import missing_numbers, with_proposal
 from upright.identification.estimate import identify
 from upright.physics import CartPendulum, Furuta, Pendulum, find
 from upright.simulation import simulate
@@ -79,6 +80,27 @@ def test_nothing_is_missing_from_a_model_that_explains_its_runs():
     fit = identify(asked(Pendulum, PENDULUM, "J_p", "b_2"), [noisy(swing(), 2e-3, seed=5)])
     assert fit.trusted
     assert fit.proposed == {}
+
+
+@pytest.mark.parametrize(
+    ("percents", "more", "looked"),
+    [
+        ({"fit": 79.9}, {}, True),
+        ({"fit": 80.0}, {}, False),  # explained well enough
+        ({"predict": 30.0}, {}, False),  # nothing was fitted
+        ({"fit": 30.0}, {"interrupted": True}, False),
+        ({"fit": 30.0}, {"failed": True}, False),
+    ],
+)
+def test_what_is_missing_is_looked_for_where_a_whole_fit_explains_its_runs_badly(monkeypatch, percents, more, looked):
+    asked_for = []
+    monkeypatch.setattr(
+        "upright.identification.checks.structure.proposed", lambda _, runs, worst: asked_for.append((runs, worst))
+    )
+    runs = {role: SimpleNamespace(role=role, fit_percent={"a": 99.0, "b": p}) for role, p in percents.items()}
+    fit = SimpleNamespace(**({"runs": runs, "interrupted": False, "failed": False, "model": None} | more))
+    assert with_proposal(fit, []) is fit  # nothing is found here
+    assert asked_for == [([], 79.9)] * looked
 
 
 def test_what_is_known_or_assumed_is_no_number_that_is_left_out():

@@ -187,6 +187,20 @@ def test_what_an_assumed_zero_moves_rests_on_it():
     assert "equivalent point pendulum" in fits[0].verdict
 
 
+def test_what_is_known_per_one_assumed_number_holds_what_another_may_be():
+    """A mass of 1 kg and no inertia are assumed: friction per mass still depends on the inertia, the length does not."""
+    fit = identify(hanging({"m_p": 1.0, "J_p": 0.0}, {}, {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}), [swing()])
+    known = {n: e for a in fit.assumptions for n, e in a.ratios.items()}
+    for name in ("b_2", "b_2c"):
+        e = known[f"{name}/m_p"]
+        assert e.rests_on == ("J_p",)
+        assert e.interval[0] < SWING[name] / SWING["m_p"] < e.interval[1]
+    equal = (SWING["J_p"] + SWING["m_p"] * SWING["l_cg"] ** 2) / (SWING["m_p"] * SWING["l_cg"])
+    e = known["J_A/(m_p l_cg)"]
+    assert e.rests_on == ()
+    assert e.value == pytest.approx(equal, rel=1e-3)
+
+
 def test_the_verdict_names_the_measurement_that_frees_a_number():
     asked = {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}
     light = identify(hanging({"m_p": 1.0}, {"J_p": 0.0}, asked), [swing()])
