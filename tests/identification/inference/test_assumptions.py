@@ -188,7 +188,7 @@ def test_what_an_assumed_zero_moves_rests_on_it():
 
 
 def test_what_is_known_per_one_assumed_number_holds_what_another_may_be():
-    """A mass of 1 kg and no inertia are assumed: friction per mass still depends on the inertia, the length does not."""
+    """A mass of 1 kg and no inertia are assumed: friction per mass depends on the inertia, the length on neither."""
     fit = identify(hanging({"m_p": 1.0, "J_p": 0.0}, {}, {"l_cg": 0.25, "b_2": 1e-3, "b_2c": 1e-3}), [swing()])
     known = {n: e for a in fit.assumptions for n, e in a.ratios.items()}
     for name in ("b_2", "b_2c"):
