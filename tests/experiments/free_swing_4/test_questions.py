@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from upright.experiments.free_swing_4 import run as free_swing
 from upright.experiments.free_swing_4.release import anchored, freed
 from upright.experiments.free_swing_4.run import (
     FRICTION,
@@ -17,6 +18,7 @@ from upright.experiments.free_swing_4.run import (
     measured_beforehand,
     questions,
     recovered,
+    run_free_swing,
     write_questions,
 )
 from upright.experiments.stand.known import Known
@@ -160,3 +162,49 @@ def test_the_balance_is_that_of_the_fitted_plant_over_twelve_seconds():
     total = b.stored + sum(b.dissipated.values())
     assert total == pytest.approx(b.stored[0], rel=1e-4)
     assert set(b.dissipated) == {"viscous friction", "Coulomb friction of psi", "Coulomb friction of theta"}
+
+
+@pytest.fixture
+def swung(monkeypatch, tmp_path):
+    """A free swing whose fits are said beforehand: what is told, and what came of it when something stops it."""
+    monkeypatch.setattr(free_swing, "write_questions", lambda rig, *_: [(q, tmp_path) for q in questions(rig)])
+    monkeypatch.setattr(free_swing, "drift_paths", lambda rig: ("paths",))
+    monkeypatch.setattr(free_swing, "balance", lambda result: "balance")
+    told = []
+
+    def swing(rig=DISK, swallows="", stopped=lambda: False, until=2.0):
+        def fit(question, path, progress):
+            progress("fitting", 1.0)
+            return SimpleNamespace(fit=SimpleNamespace(interrupted=question.name == swallows))
+
+        def tell(step, share):
+            told.append(share)
+            if share > until:
+                raise KeyboardInterrupt
+
+        told.clear()
+        monkeypatch.setattr(free_swing, "fit_question", fit)
+        return run_free_swing(rig, 5, tmp_path, tell, stopped), list(told)
+
+    return swing
+
+
+def test_every_question_is_fitted_and_the_share_told_never_goes_back(swung):
+    done, told = swung()
+    assert list(done.answers) == [q.name for q in questions(DISK)]
+    assert (done.drifts, done.balance, done.interrupted) == (("paths",), "balance", False)
+    assert (done.rig.seed, done.body, done.make.key) == (5, "disk", "furuta")
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0.0, 0.9)
+    assert told[1:-1] == pytest.approx([0.05 + 0.85 * (i + 1) / 5 for i in range(5)])
+    assert swung(CART)[0].body == "cart"
+
+
+def test_what_was_fitted_before_somebody_stopped_it_is_kept(swung):
+    for how, kept in (
+        ({"swallows": "level_model"}, 3), ({"stopped": lambda: True}, 1), ({"until": -1.0}, 0), ({"until": 0.3}, 1),
+    ):  # fmt: skip
+        done, _ = swung(**how)
+        assert done.interrupted
+        assert len(done.answers) == kept
+        assert (done.drifts, done.balance) == ((), None)

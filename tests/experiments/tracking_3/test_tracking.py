@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from upright.control import trial
 from upright.experiments.tracking_3 import laws as pd
+from upright.experiments.tracking_3 import run as tracking
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
-from upright.experiments.tracking_3.run import RESERVE, attempt, choose_step, levels_of, run_tracking
+from upright.experiments.tracking_3.run import RESERVE, attempt, choose_step, levels_of, run_tracking, track_on
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
 from upright.gains.loop import swing
@@ -340,3 +342,103 @@ def test_of_laws_that_arrive_at_once_the_one_that_rests_soonest_is_taken(monkeyp
     monkeypatch.setattr(pd, "tried", rests)
     law, _ = pd.tune(make_rig("rectilinear"), 0.01, 5.0)
     assert law.k_pf == pytest.approx(100.0, rel=0.06)
+
+
+@pytest.fixture
+def tracked(monkeypatch, tmp_path):
+    """An experiment whose runs are said beforehand: the trips that are predicted, and what was run on the stand."""
+
+    def track(stand=None, *, tripped=math.inf, saturated=False, stops=99, rig=None, **more):
+        rig, told, left = rig or make_rig("torsional"), [], [stops]
+        step = SimpleNamespace(size=0.05, reason="as requested")
+        expected = SimpleNamespace(tripped=tripped, effort=SimpleNamespace(saturated=saturated))
+
+        def stopped():
+            left[0] -= 1
+            return left[0] < 0
+
+        monkeypatch.setattr(tracking, "choose_step", lambda model, laws, size: step)
+        monkeypatch.setattr(tracking, "attempt", lambda model, law, size: expected)
+        monkeypatch.setattr(tracking, "figured", lambda trial, size: trial)
+        monkeypatch.setattr(
+            tracking, "tune", lambda model, size, most: (pd.near_pd(model, "PD", 2.0, 0.1), (size, most))
+        )
+        done = track_on(rig, stand, tmp_path, None, None, lambda _, share: told.append(share), stopped, **more)
+        assert told == sorted(told)
+        return done, expected
+
+    return track
+
+
+class Held:
+    """A stand that notes the laws it is given."""
+
+    performed = ""
+
+    def __init__(self, rig, may_fall, make=None):
+        self.rig, self.may_fall, self.make, self.held, self.asked = rig, may_fall, make, [], []
+        self.names = [c.name for c in rig.plant.coordinates]
+
+    def ask(self, sentence):
+        self.asked.append(sentence)
+
+    def hold(self, law, at, folder, stem, seconds, *, reference, pushes):
+        self.held.append((stem, seconds, reference, pushes))
+        return SimpleNamespace(trial=f"run of {stem}")
+
+
+def test_every_law_is_tried_and_told_by_its_run(tracked):
+    """Four sets, the strongest with a sum, a PD, one as stiff as the strongest, and one on the far encoder."""
+    rig = make_rig("torsional")
+    stand = Held(rig, True, MAKES["torsional"])
+    done, expected = tracked(stand)
+    assert [stem for stem, *_ in stand.held] == [
+        *(f"tracking_set_{i}" for i in range(1, 5)), "tracking_with_a_sum", "tracking_PD", "tracking_PD_as_stiff",
+        "tracking_PD_far_encoder",
+    ]  # fmt: skip
+    assert [o.measured for o in done.outcomes] == [f"run of {stem}" for stem, *_ in stand.held]
+    assert all(o.predicted is expected for o in done.outcomes)
+    assert len(stand.asked) == 8
+    (_, seconds, reference, pushes), *_ = stand.held
+    np.testing.assert_array_equal(np.column_stack([reference, pushes]), np.column_stack(levels_of(rig, 0.05)))
+    assert seconds == pytest.approx((reference.size - 1) * rig.period)
+    strongest = max(paper_sets(rig), key=lambda law: law.k_pf)
+    np.testing.assert_allclose(done.summed.law.requested, [*strongest.requested, EXTRA])
+    assert done.stiff.law.k_pf == strongest.k_pf
+    assert (done.far.law.K[2], done.far.law.K[3]) == (2.0, 0.1)
+    assert done.search == (0.05, RESERVE * rig.limit)
+    own = tracked(None, which=(1,), poles=np.array([-5.0, -6.0, -7.0, -8.0]))[0]
+    assert [o.law.name for o in own.sets] == ["set 1", "own set"]
+    assert [o.measured for o in own.outcomes] == [o.predicted for o in own.outcomes]  # nothing was run
+
+
+@pytest.mark.parametrize(
+    ("expected", "may_fall", "ran"),
+    [({}, False, 7), ({"tripped": 0.3}, False, 0), ({"saturated": True}, False, 0), ({"tripped": 0.3}, True, 8)],
+)
+def test_a_live_shaft_is_not_asked_for_what_would_trip_saturate_or_grow(tracked, expected, may_fall, ran):
+    """A PD on the far encoder is unstable whatever its gains, so that it is tried where nothing breaks."""
+    stand = Held(make_rig("torsional"), may_fall, MAKES["torsional"])
+    tracked(stand, **expected)
+    assert len(stand.held) == ran
+    assert not (ran == 7 and any("far" in stem for stem, *_ in stand.held))
+
+
+@pytest.mark.parametrize(("stops", "there"), [(0, 4), (1, 6), (99, 8)])
+def test_a_stop_between_trials_keeps_those_that_were_made(tracked, stops, there):
+    done, _ = tracked(None, stops=stops)
+    assert len(done.outcomes) == there
+    assert done.interrupted == (stops < 2)
+
+
+@pytest.mark.parametrize("faster", [1.0, 2.0])
+def test_poles_for_a_shaft_of_one_s_own_are_as_much_faster_as_it_swings(tracked, faster):
+    """A spring four times as stiff swings twice as fast, without friction."""
+    nominal = MAKES["torsional"].rig.plant
+    free = {n: 0.0 for n in nominal.names() if n.startswith("c_")}
+    rig = make_rig("torsional").changed(k_12=faster**2 * nominal.k_12, **free)
+    ratio = np.abs(rig.plant.linear(AT).poles().imag).max() / np.abs(nominal.linear(AT).poles().imag).max()
+    assert ratio == pytest.approx(faster, rel=0.02)
+    done, _ = tracked(Held(rig, True), rig=rig, stops=0)
+    for outcome, printed in zip(done.sets, paper_sets(rig), strict=True):
+        np.testing.assert_allclose(outcome.law.requested, ratio * printed.requested)
