@@ -6,9 +6,10 @@ import pytest
 from upright.errors import BadInput
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.twin import TwinStand
+from upright.experiments.weighing_1a import from_logs
 from upright.experiments.weighing_1a.chapter import chapter
 from upright.experiments.weighing_1a.from_logs import weigh_logs
-from upright.experiments.weighing_1a.run import Weighing, first_body, measure_body, run_weighing
+from upright.experiments.weighing_1a.run import Weighing, drawn_twin, first_body, measure_body, run_weighing
 from upright.records import Record
 from upright.rig.makes import BODIES, MAKES, make_rig
 
@@ -78,3 +79,29 @@ def test_logs_of_one_name_keep_apart_and_weigh_what_their_frequencies_say():
     assert (found.k.value, found.bare.value) == pytest.approx((k, bare), rel=1e-3)
     assert found.damping.value == pytest.approx(damping, rel=1e-2)
     assert told.steps[1].command == 'upright plan-inertias --rig rectilinear --bare "0.6 kg"'
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_a_twin_is_weighed_again_from_its_logs_where_a_folder_keeps_them(tmp_path, monkeypatch, named):
+    """With no mass and four, once each: what its swings say lies by the true stiffness, and its steps can be typed."""
+    body = measure_body(drawn_twin(4, "rectilinear"), counts=(0, 2, 4), shots=1)
+    monkeypatch.setattr(from_logs, "measure_body", lambda on: body)
+    loadings, page = from_logs.weigh_twin("rectilinear", 4, tmp_path if named else None)
+    true = drawn_twin(4, "rectilinear")
+    assert loadings.k.value == pytest.approx(true.stiffness, rel=0.02)
+    assert page.title == "Experiment 1a on a twin, rectilinear, seed 4"
+    assert page.numbers["truth"]["k"] == true.stiffness
+    typed = [s.command for s in page.steps]
+    assert typed[-1] == "upright plan-inertias --rig rectilinear"
+    written = sorted(p.name for p in tmp_path.iterdir())
+    assert typed[:-1] == [
+        f'upright loadings {" ".join(written)} --added "0 kg" --added "1 kg" --added "2 kg"'
+    ] * named  # fmt: skip
+    if named:
+        again, _ = weigh_logs([(Record.from_csv(tmp_path / name), name) for name in written], ["0 kg", "1 kg", "2 kg"])
+        assert again.k.value == pytest.approx(loadings.k.value, rel=1e-3)
+
+
+def test_twins_are_bodies_on_springs():
+    with pytest.raises(BadInput, match=r"--rig is rectilinear or torsional, got 'furuta'"):
+        from_logs.weigh_twin("furuta", 0, None)
