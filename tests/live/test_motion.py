@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import math
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +15,8 @@ import pytest
 import upright as up
 from tests.live.browser import WIDTHS, opened, until
 from upright.identification import RunScore
-from upright.live.motion import MOST, RATE, motion_page
+from upright.live.motion import MOST, RATE, _strip, motion_page
+from upright.live.page import still
 from upright.verbs.control.moving import played_run
 
 ARM = up.Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=0.003, b_2=2e-4)
@@ -112,3 +117,101 @@ def test_without_a_script_rig_and_traces_are_there(written):
         assert page.locator("#rig polyline").count() >= 3
         assert page.locator("svg.strip polyline").count() == 4
         assert not page.locator("#scrub").is_visible()
+
+
+def numbers_of(packed):
+    """What a page unpacks: a middle, and levels of 16 bits about it."""
+    return packed["middle"] + packed["scale"] * np.frombuffer(base64.b64decode(packed["levels"]), dtype="<i2")
+
+
+def test_a_picture_shows_the_record_at_its_time_and_what_nobody_measured_as_the_model_has_it():
+    """Straight lines from 2 s on, so that between two samples the middle is right; four seconds are 241 pictures."""
+    t = np.array([2.0, 3.0, 6.0])
+    text = motion_page(ARM, t, {"theta": 2 * t}, {"psi": -t, "theta": 3 * t}, name="run", remark="Read this.")
+    data = json.loads(re.search(r"const RUN = (\{.*?\});\n", text)[1])
+    assert (data["frames"], data["start"], data["step"]) == (241, 2.0, pytest.approx(4 / 240))
+    psi, theta = data["coordinates"]
+    grid = 2.0 + np.arange(241) / 60
+    assert psi["measured"] is None
+    for shown, values in ((psi["simulated"], -grid), (theta["measured"], 2 * grid), (theta["simulated"], 3 * grid)):
+        np.testing.assert_allclose(numbers_of(shown), values, atol=24 / 2**16)
+    assert [(c["name"], c["unit"]) for c in (psi, theta)] == [("psi", "rad"), ("theta", "rad")]
+    assert "Read this." in text
+    bare = motion_page(ARM, t, {"theta": 2 * t}, {}, name="run")
+    psi, theta = json.loads(re.search(r"const RUN = (\{.*?\});\n", bare)[1])["coordinates"]
+    assert not numbers_of(psi["simulated"]).any()
+    assert theta["measured"] == theta["simulated"]
+    brief = motion_page(ARM, np.array([0.0, 1e-3]), {}, {"theta": np.zeros(2)}, name="run")
+    assert json.loads(re.search(r"const RUN = (\{.*?\});\n", brief)[1])["frames"] == 2
+
+
+def test_a_strip_is_the_record_with_a_tenth_of_room_and_the_model_within_it():
+    """From 0 to 1 rad the box spans -0.1 to 1.1: the record ends 1/12 of 100 below its top, a model beyond it there."""
+    rise = np.linspace(0.0, 1.0, 5)
+    drawn = _strip("theta", "rad", rise, 3 * rise)
+    points = [tuple(map(float, pair.split(","))) for pair in drawn["measured"].split()]
+    np.testing.assert_allclose(points, np.column_stack([250 * np.arange(5), 100 * (1.1 - rise) / 1.2]), atol=0.01)
+    model = [tuple(map(float, pair.split(","))) for pair in drawn["simulated"].split()]
+    assert model[0] == pytest.approx((0.0, 100 * 1.1 / 1.2), abs=0.01)
+    assert model[-1] == (1000.0, 0.0)
+    assert drawn["range"] == "[−5.73 to 63 deg]"
+    assert drawn["label"] == "θ over time, from −5.73 to 63 deg"
+    cart = _strip("x", "m", None, 0.2 * rise)
+    assert (cart["measured"], cart["range"]) == ("", "[−2 to 22 cm]")
+    still = _strip("x", "m", np.zeros(3), np.zeros(3))
+    assert still["range"] == "[−0.1 to 0.1 cm]"
+    assert {pair.split(",")[1] for pair in still["simulated"].split()} == {"50"}
+    long = _strip("x", "m", None, np.linspace(0, 1, 5000))["simulated"].split()
+    assert len(long) == 1200
+    assert (long[0].split(",")[0], long[-1].split(",")[0]) == ("0", "1000")
+
+
+def test_predictions_that_overlap_are_shown_in_the_order_of_their_times():
+    run = swing()
+    mixed = np.random.default_rng(3).permutation(run.t.size)
+    shuffled = replace(run, t=run.t[mixed], y=run.y[mixed], simulated=run.simulated[mixed], horizon=0.5)
+    plain, told = (played_run(r, ARM, "tail").page for r in (run, shuffled))
+    assert re.search(r"const RUN = .*", plain)[0] == re.search(r"const RUN = .*", told)[0]
+    assert "Predicted 0.5 s ahead, again and again." in told
+    assert "again and again" not in plain
+    alone = replace(
+        run, y=run.y[:, 1:], simulated=run.simulated[:, 1:], measured=("theta",), fit_percent={"theta": 95.0}
+    )
+    assert "Not measured, drawn at zero: psi." in played_run(alone, ARM, "tail").page
+    assert "drawn at zero" not in plain
+    assert played_run(alone, ARM, "tail").chapter.verdict.endswith("of 'tail': theta 95.0 %.")
+    assert 'height="760"' in played_run(run, ARM, "tail")._repr_html_()
+
+
+class Drawn:
+    """A plant whose lines are said; the second is the pendulum's."""
+
+    def __init__(self, *lines):
+        self.lines, self.coordinates = lines, [SimpleNamespace(name="x"), SimpleNamespace(name="theta")]
+
+    def outline(self, _plant, q):
+        return self.lines
+
+
+def places(picture):
+    return [
+        [tuple(map(float, pair.split(","))) for pair in line.split()] for line in re.findall(r'points="(.*?)"', picture)
+    ]
+
+
+def test_what_moves_in_a_plane_is_drawn_in_it_and_what_does_not_from_above_and_aside():
+    """Seen from 25 degrees aside and 20 above: the axes' pictures are columns of two rotations."""
+    view, picture = still(Drawn(("", [(0, 0, 0), (1, 0, 0)]), ("theta", [(0, 0, 0), (0, 0, -2)])), [0.0, 0.0])
+    assert places(picture) == [[(0, 0), (1, 0)], [(0, 0), (0, 2)]]  # down is down
+    assert re.findall(r'class="(\w+)"', picture) == ["fixed", "q1"]
+    assert [float(n) for n in view.split()] == pytest.approx([-2.2, -2.3, 4.4, 4.6])
+    widths = [float(n) for n in re.findall(r'stroke-width="(.*?)"', picture)]
+    assert widths == pytest.approx([0.7 * 0.044, 1.8 * 0.044])
+    axes = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    view, picture = still(Drawn(*(("x", [(0, 0, 0), axis]) for axis in axes)), [0.0, 0.0])
+    c, s, C, S = (f(math.radians(a)) for a in (25, 20) for f in (math.cos, math.sin))
+    seen = [line[1] for line in places(picture)]
+    np.testing.assert_allclose(seen, [(c, s * S), (s, -c * S), (0, -C)], atol=1e-4)
+    assert [float(n) for n in view.split()] == pytest.approx([-1.1, -1.15, 2.2, 2.3])
+    flat = still(Drawn(("x", [(0, 0, 0), (4, 0, 0)])), [0.0, 0.0])[0]
+    assert [float(n) for n in flat.split()] == pytest.approx([-4.4, -2.3, 8.8, 4.6])  # half as high as it reaches
