@@ -5,17 +5,19 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import control
 import numpy as np
 import pytest
 
-from upright.errors import NotIdentifiable
+from upright.errors import BadInput, NotIdentifiable
+from upright.experiments.frequency_1b import run as frequency_run
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_charts
 from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
 from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, _probed, broadband, collect, grid, sines, stepped_sine
-from upright.experiments.stand.known import bench, model_of
+from upright.experiments.stand.known import Known, bench, model_of
 from upright.identification.frequency.answer import explain, key_value
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
@@ -23,7 +25,7 @@ from upright.identification.model.fit import Estimate, Pole
 from upright.readers import read
 from upright.records import Record
 from upright.report.page import Picture, Symbol
-from upright.rig.makes import MAKES, make_rig
+from upright.rig.makes import MAKES, hardware_of_make, make_rig
 from upright.study.stored_rig import read_stored_rig
 
 TICK = 2e-3
@@ -366,3 +368,95 @@ def test_a_documented_compensator_is_found_in_real_logs():
     s = 2 / 2e-3 * 1j * np.tan(found.omega * 2e-3 / 2)
     assert found.response[:, 0] == pytest.approx(3 * (s + 13) / (s + 20), rel=0.05)
     assert found.coherence.min() > 0.99
+
+
+@pytest.fixture
+def swept(monkeypatch, tmp_path):
+    """A sweep and a fit that are said beforehand; what each was asked is noted."""
+    noted = {"told": []}
+    log = Record(t=np.arange(3.0), signals={"u": np.zeros(3), "theta": np.zeros(3)})
+    sweep = SimpleNamespace(log=log, response="response")
+
+    def explained(model, at, response, *, seed, tell, stopped):
+        noted["model"], noted["at"], noted["seed"], noted["response"] = model, at, seed, response
+        for share in (0.25, 0.5, 1.0):
+            tell("least squares, several starts", share)
+        tell("simplex on J_p", 1.0)
+        return "answer"
+
+    monkeypatch.setattr(frequency_run, "stepped_sine", lambda rig, make: noted.update(by="sines") or sweep)
+    monkeypatch.setattr(
+        frequency_run, "broadband", lambda rig, make, kind, *, seed: noted.update(by=(kind, seed)) or sweep
+    )
+    monkeypatch.setattr(frequency_run, "explain", explained)
+    monkeypatch.setattr(frequency_run, "write_response_fit", lambda *what, **more: noted.update(written=(what, more)))
+
+    def sweep_it(rig, seed, **more):
+        noted["told"].clear()
+        return run_frequency(rig, seed, tmp_path, lambda _, share: noted["told"].append(share), **more), noted
+
+    return sweep_it
+
+
+def test_a_twin_is_swept_as_it_was_asked_and_what_was_weighed_takes_the_place_of_the_bench(swept, tmp_path):
+    weighed = (Known(name="J_d", value=0.01, stderr=1e-4),)
+    done, noted = swept("furuta", 3, weighed=weighed)
+    rig = make_rig("furuta", 3)
+    assert (done.rig, done.kind, done.answer, noted["by"], noted["at"]) == (rig, "sines", "answer", "sines", "hanging")
+    parameters = noted["model"].parameters
+    assert (parameters["J_d"].value, parameters["J_d"].estimate) == (0.01, False)
+    assert parameters["J_d"].uncertainty == pytest.approx(1e-4)
+    for name, value in bench(rig, MAKES["furuta"]).items():
+        if name != "J_d":
+            assert parameters[name].value == value
+            assert parameters[name].uncertainty == pytest.approx(MAKES["furuta"].bench[name] * value)
+    assert noted["told"] == sorted(noted["told"])
+    assert (noted["told"][0], noted["told"][-1]) == (0.0, 1.0)
+    assert (tmp_path / "sweep.csv").exists()
+    assert done.truth == {**rig.plant.parameters(), **rig.drive}
+    (answer, folder, plant, title), more = noted["written"]
+    assert (answer, folder, plant, title) == ("answer", tmp_path, "furuta", f"Frequency response of {rig.name}, seed 3")
+    assert more["known_hardware"] == hardware_of_make(rig)
+    assert swept("torsional", 2, kind="sweep")[1]["by"] == ("sweep", 2)
+    with pytest.raises(KeyboardInterrupt):
+        swept("torsional", 2, stopped=lambda: True)
+
+
+STUDY = """
+[rig]
+plant = "pendulum"
+[parameters]
+m_p = "0.2 kg"
+l_cg = { guess = "0.25 m", min = 0 }
+J_p = "2e-3 kg m^2"
+[drive]
+column = "u"
+unit = "N m"
+[sensors.theta]
+column = "theta"
+unit = "rad"
+"""
+
+
+@pytest.mark.parametrize("roles", [("fit", "predict"), ("predict", "fit"), ("fit", "fit")])
+def test_the_response_of_a_study_is_that_of_its_fitted_runs(tmp_path, roles):
+    text = STUDY
+    for i, role in enumerate(roles):
+        rows = "".join(f"{k / 100},{0.1 * (k % 7)},{0.01 * i * (k % 5)}\n" for k in range(50))
+        (tmp_path / f"{i}.csv").write_text(f"t,u,theta\n{rows}", encoding="utf-8")
+        text += f'[[runs]]\nfile = "{i}.csv"\nrole = "{role}"\n'
+    path = tmp_path / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    model, plant, records, resolution, _ = frequency_run._study(path, None)
+    assert (plant, list(model.estimated)) == ("pendulum", ["l_cg"])
+    fitted = [i for i, role in enumerate(roles) if role == "fit"]
+    assert len(records) == len(fitted)
+    for record, i in zip(records, fitted, strict=True):
+        np.testing.assert_allclose(record["theta"], [0.01 * i * (k % 5) for k in range(50)], atol=1e-12)
+        np.testing.assert_allclose(record["u"], [0.1 * (k % 7) for k in range(50)])
+        assert (record.inputs, record.outputs, record.units["theta"]) == (("u",), ("theta",), "rad")
+    assert len(resolution) == 1
+    held = path.with_name("held.toml")
+    held.write_text(text.replace('"fit"', '"predict"'), encoding="utf-8")
+    with pytest.raises(BadInput, match="needs fitted runs"):
+        frequency_run._study(held, None)
