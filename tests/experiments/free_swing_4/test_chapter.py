@@ -90,6 +90,7 @@ def test_a_level_model_stands_beside_a_leaning_one_with_the_worst_of_what_each_w
     assert f"With the rig 0.25° out of level, {pair}" in said(told)
     for names in (("free_swing", "level_model"), ("free_swing", "tilt_model"), ("free_swing",)):
         assert "cannot explain" not in said(chapter(done(names=names)))
+    assert pair in said(chapter(done(names=("level_model", "tilt_model"))))
 
 
 def test_the_table_of_a_leaning_rig_has_the_worst_run_of_either_role_and_the_lean_in_degrees(told):
