@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 
 from upright.control import trial
+from upright.errors import BadInput
 from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3 import run as tracking
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
-from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses
+from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses, rig_of_file, shaft_study
 from upright.experiments.tracking_3.run import RESERVE, attempt, choose_step, levels_of, run_tracking, track_on
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
@@ -23,6 +25,7 @@ from upright.identification.estimate import identify
 from upright.physics import chain
 from upright.rig.makes import MAKES, SHAFTS, make_rig
 from upright.study.load import load_study
+from upright.units import parse
 
 FRICTIONLESS = {"f_1c": 0.0, "f_2c": 0.0}
 
@@ -442,3 +445,68 @@ def test_poles_for_a_shaft_of_one_s_own_are_as_much_faster_as_it_swings(tracked,
     done, _ = tracked(Held(rig, True), rig=rig, stops=0)
     for outcome, printed in zip(done.sets, paper_sets(rig), strict=True):
         np.testing.assert_allclose(outcome.law.requested, ratio * printed.requested)
+
+
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_pulses_bring_what_is_free_back_to_where_it_began(kind):
+    """A double integrator ends at rest and at zero; pauses of 0.35 s lie between six pulses, and four weaker ones."""
+    rig = make_rig(kind, 2)
+    dt = 5 * rig.period
+    sizes = []
+    logs = {"pulses.csv": (0.06, 0.10, 0.05, 0.08, 0.06, 0.04), "others.csv": (0.09, 0.05, 0.10, 0.07)}
+    for file, widths in logs.items():
+        log = pulses(rig, file)
+        u = log["u"]
+        assert log.period == pytest.approx(dt)
+        speed = np.cumsum(u)
+        assert speed[-1] == pytest.approx(0.0, abs=1e-9)
+        assert np.cumsum(speed)[-1] == pytest.approx(0.0, abs=1e-9)
+        sizes.append(np.abs(u).max())
+        assert set(np.abs(u)) == {0.0, sizes[-1]}
+        on = np.flatnonzero(np.diff(np.concatenate([[0], np.abs(u) > 0, [0]])))
+        begins, ends = on[::2], on[1::2]
+        np.testing.assert_allclose((ends - begins) * dt, 4 * np.array(widths), atol=2.01 * dt)
+        np.testing.assert_allclose(np.diff(np.concatenate([[0], begins]))[0] * dt, 0.35, atol=0.51 * dt)
+        np.testing.assert_allclose((begins[1:] - ends[:-1]) * dt, 0.35, atol=0.51 * dt)
+        assert (u[begins] > 0).tolist() == [i % 2 == 0 for i in range(len(widths))]
+        assert (u.size - ends[-1]) * dt == pytest.approx(0.35, abs=0.51 * dt)
+    assert sizes == pytest.approx([MAKES[kind].pulse, 0.7 * MAKES[kind].pulse], abs=rig.converter)
+    assert {log.units[n] for n in log.outputs} == {"counts"}
+
+
+@pytest.mark.parametrize("kind", SHAFTS)
+def test_the_study_of_a_shaft_starts_30_percent_off_and_knows_the_gain_or_what_was_weighed(kind):
+    rig, make = make_rig(kind, 2), MAKES[kind]
+    body = make.body
+    design = make.rig.plant.parameters()
+    alone = tomllib.loads(shaft_study(rig, 3))
+    weighed = (Known(name=body, value=0.5, stderr=0.01), Known(name="k_12", value=9.0, stderr=0.1))
+    known = tomllib.loads(shaft_study(rig, 3, weighed))
+    for study in (alone, known):
+        for name, entry in study["parameters"].items():
+            if "guess" in entry:
+                ratio = parse(entry["guess"], make.rig.plant.quantity(name).unit) / design[name]
+                assert min(abs(ratio - 0.7), abs(ratio - 1.3)) < 1e-3
+                assert entry["min"] == 0
+        assert set(study["parameters"]) == {n for n, v in design.items() if v}
+        assert parse(study["actuator"]["delay"], "s") == pytest.approx(rig.delay)
+        assert parse(study["actuator"]["lag"], "s") == pytest.approx(rig.lag)
+        assert {run["file"]: run["role"] for run in study["runs"]} == {"pulses.csv": "fit", "others.csv": "predict"}
+        assert study["defaults"]["initial"] == dict.fromkeys(rig.plant.state_names()[1::2], 0.0)  # at rest
+    unit = make.rig.plant.quantity(body).unit
+    assert "guess" in alone["parameters"][body]
+    assert parse(known["parameters"][body]["value"], unit) == pytest.approx(0.5)
+    assert parse(known["parameters"][body]["uncertainty"], unit) == pytest.approx(0.01)
+    assert "guess" in known["parameters"]["k_12"]  # it errs with the inertia
+    assert alone["actuator"]["gain"]["uncertainty"] == "2 %"
+    assert "guess" in known["actuator"]["gain"]
+
+
+def test_a_shaft_with_a_spring_to_ground_is_not_tracked():
+    rig = make_rig("torsional")
+    assert rig_of_file(rig, "fit.json").name == "the rig of fit.json"
+    for spring in ("k_1", "k_2"):
+        with pytest.raises(BadInput, match="without springs to ground"):
+            rig_of_file(rig.changed(**{spring: 1.0}), "fit.json")
+    with pytest.raises(BadInput, match="two inertias on a shaft"):
+        rig_of_file(make_rig("linear"), "fit.json")
