@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from upright.identification.estimate import _correlation
+from upright.identification.estimate import _correlation, least_explained
 
 NAMES = ("J_p", "b_2", "offset", "m_p", "k")
 SIGMA = np.array([2e-5, 3e-4, 1.0, 0.02, 40.0])
@@ -48,3 +48,12 @@ def test_a_number_at_its_bound_correlates_with_itself_alone() -> None:
 def test_where_a_run_is_lost_no_correlation_is_known() -> None:
     nothing = np.full((5, 5), np.nan)
     assert _correlation(best(nothing, lost=("swing",)), seen("J_p", "b_2")).tolist() == [[1, 0], [0, 1]]
+
+
+def test_the_least_explained_is_the_worst_signal_of_the_fitted_runs() -> None:
+    runs = {
+        name: cast(Any, SimpleNamespace(role=role, fit_percent={"x": x, "theta": theta}))
+        for name, role, x, theta in (("a", "fit", 99.0, 93.0), ("b", "fit", 95.0, 97.0), ("c", "predict", 12.0, 50.0))
+    }
+    assert least_explained(runs) == 93.0
+    assert least_explained({"c": runs["c"]}) == 100.0  # nothing was fitted, so nothing is explained badly

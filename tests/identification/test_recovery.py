@@ -121,3 +121,7 @@ def test_nothing_to_fit_is_said_in_a_sentence() -> None:
         identify(rig(Pendulum, PENDULUM, {}), [swing()])
     with pytest.raises(BadInput, match="least-squares"):
         identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3}), [swing()], method="least-square")
+    with pytest.raises(BadInput, match="run 'swing' has 9 samples, at least 10 are needed"):
+        identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3}), [swing(), swing(seconds=0.08)])
+    ten = identify(rig(Pendulum, PENDULUM, {"b_2": 1e-3}), [swing(seconds=0.09)], method="least-squares", watch=False)
+    assert len(ten.runs["swing"].t) == 10
