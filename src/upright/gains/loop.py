@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from upright.errors import BadInput
 from upright.gains.margins import Margins, Response, balanced, of_crossings, phases, root
-from upright.gains.requests import Roots, conjugate_poles, poles_of
+from upright.gains.requests import conjugate_poles, poles_of
 from upright.gains.velocity import Estimator, stationary, without_feedthrough
 from upright.laws import Law
 from upright.laws.linear import Array
@@ -188,20 +188,6 @@ def swing(model: StateSpace, law: Law, start: ArrayLike, samples: int) -> tuple[
         rows[k] = state
         state = A @ state
     return rows[:, :n], rows @ out.T
-
-
-def loop_gain(model: StateSpace, law: Law, omega: ArrayLike) -> Roots:
-    """Frequency response of the loop cut at the plant's input, negative feedback, at `omega` [rad/s]; one input."""
-    B, D = law.B[:, : law.readings], law.D[:, : law.readings]
-    z = np.exp(1j * np.asarray(omega, dtype=np.float64) * model.period)[:, None, None]
-
-    def through(A: Array, first: Array, last: Array) -> Roots:
-        if A.shape[0] == 0:
-            return np.zeros((z.shape[0], last.shape[0], first.shape[1]), dtype=np.complex128)
-        return last @ np.linalg.solve(z * np.eye(A.shape[0]) - A, first[None].astype(np.complex128))
-
-    gain: Roots = -(through(law.A, B, law.C) + D) @ through(model.A, model.B, model.C)
-    return gain[:, 0, 0]
 
 
 def command_noise(model: StateSpace, law: Law, resolution: ArrayLike) -> float:
