@@ -144,14 +144,14 @@ CHAINS = {
 """Numbers, where they are let go from, and how much 1 rad of noise is, by plant."""
 
 
-def by_hand(plant, places, dt, seconds):
+def by_hand(plant, places, dt, seconds, again=AGAIN):
     """Coordinates (N, n), and each release and the next time that the hand comes [s].
 
     The hand holds for 1 s; later it moves for 0.5 s and holds for 0.5 s.
     """
     away = np.array(places)
     out, spans = [np.tile(away, (round(1 / dt), 1))], []
-    for k, share in enumerate(AGAIN):
+    for k, share in enumerate(again):
         if k:
             way = np.minimum(np.arange(round(1 / dt)) * 2 * dt, 1.0)[:, None]
             out.append((1 - way) * out[-1][-1] + way * share * away)
@@ -215,6 +215,33 @@ def test_the_period_of_a_chain_is_that_of_its_accelerations_and_not_of_its_wides
     slow, fast = np.cos(2 * np.pi * t / 10), 0.3 * np.cos(2 * np.pi * t)
     assert free_stretches(t, [slow + fast, slow - fast]) == [(0.0, t[-1])]
     assert free_stretches(t, [slow, 0.9 * slow]) == []  # it alone: fewer than two and a half periods
+
+
+@pytest.mark.parametrize(("share", "stretches"), [(0.12, 1), (0.4, 2)])
+def test_a_free_stretch_swings_a_fifth_as_far_as_the_widest_at_least(share, stretches):
+    numbers, away, _ = CHAINS["rectilinear-2"]
+    x, spans = by_hand(find("rectilinear-2")(**numbers), away, 5e-3, 2.0, again=(1.0, share))
+    found = free_stretches(np.arange(len(x)) * 5e-3, list(x.T))
+    assert len(found) == stretches
+    assert found[0][0] == pytest.approx(spans[0][0], abs=0.1)
+
+
+@pytest.mark.parametrize("samples", [20_000, 20_001, 50_000])
+def test_of_a_long_log_every_second_or_third_sample_is_looked_at(samples):
+    """As of a log that was taken so: what lies between is not looked at."""
+    every = -(-samples // 20_000)
+    t = np.arange(samples) * 1e-3
+    x = np.exp(-0.1 * t) * np.cos(6 * t)
+    between = np.arange(samples) % every > 0
+    spoilt = np.where(between, 9.0, x)
+    thinned = t[::every], x[::every]
+    found = free_stretches(t, [spoilt])
+    assert len(found) == 1
+    assert found == free_stretches(thinned[0], [thinned[1]])
+    hinge = 0.1 * np.sin(2 * t)
+    swings = free_swings(t, spoilt, np.where(between, 9.0, hinge))
+    assert swings == free_swings(*thinned, hinge[::every])
+    assert len(swings) == 1
 
 
 def test_where_nothing_swings_no_stretch_is_free():
