@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
 from io import StringIO
@@ -174,3 +175,30 @@ def test_a_chapter_is_read_as_it_was_kept(book):
     assert isinstance(cell, Symbol)
     assert cell == "J_d"
     assert not isinstance(again.parts[0].content[0], Symbol)
+
+
+@pytest.mark.parametrize(
+    ("sound", "headline"),
+    [
+        ((), "No experiment was run."),
+        ((True, True), "All 2 experiments support their verdicts."),
+        ((True, False, True), "2 of 3 experiments support their verdicts; read the caveats of e1."),
+        ((False, False), "0 of 2 experiments support their verdicts; read the caveats of e0, e1."),
+    ],
+)
+def test_the_headline_of_a_report_counts_what_its_verdicts_rest_on(sound, headline):
+    chapters = tuple(replace(chapter(f"e{i}", "cart", sound=s), warnings=()) for i, s in enumerate(sound))
+    assert Book(title="Report", facts=(), chapters=chapters).headline == headline
+
+
+def test_the_first_screen_has_a_number_of_every_chapter_and_five_in_all():
+    """Of each the first that has an interval; then others, chapter by chapter."""
+
+    def of(key, *numbers):
+        found = tuple(KeyNumber(what=what, value="1", interval="0 to 2" * known) for what, known in numbers)
+        return replace(chapter(key, "cart"), findings=found)
+
+    one = of("1", ("bare", False), ("a", True), ("b", True), ("c", True))
+    two, three = of("2", ("d", True), ("e", True), ("f", True)), of("3", ("bare", False))
+    shown = Book(title="Report", facts=(), chapters=(one, two, three)).numbers
+    assert [number.what for number in shown] == ["a", "d", "b", "c", "e"]

@@ -293,3 +293,42 @@ def test_a_log_of_the_files_motion_identifies_what_the_file_has(tmp_path):
     fit = up.identify(tmp_path / "log.csv", path, ask=["b_2"], units={"theta": "rad"})
     assert fit.plant.b_2 == pytest.approx(2e-3, rel=1e-3)
     assert fit.plant.m_p == 0.3
+
+
+def left_out(path):
+    return [sentence for sentence in read_mjcf(path).left_out if sentence.startswith("Left out")]
+
+
+POST = '<geom type="box" size="0.01 0.01 0.1" pos="0.5 0 0" {}/>'
+STICK = '<geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.01" mass="0.1" {}/>'
+
+
+@pytest.mark.parametrize(
+    ("post", "stick", "flag", "said"),
+    [
+        ("", "", "", True),  # a pole may strike what stands in the world
+        ('contype="0" conaffinity="0"', "", "", False),
+        ("", 'contype="0" conaffinity="0"', "", False),
+        ('contype="2" conaffinity="2"', "", "", False),  # bits that do not meet
+        ('contype="2" conaffinity="2"', 'contype="1" conaffinity="2"', "", True),
+        ("", "", '<option><flag contact="disable"/></option>', False),
+    ],
+)
+def test_contacts_are_left_out_aloud_where_the_file_has_some(post, stick, flag, said, tmp_path):
+    """In MuJoCo two geoms touch where a bit of one's type is in the other's affinity, unless one carries the other."""
+    bodies = f"{POST.format(post)}{cart(rod=STICK.format(stick))}"
+    path = written(tmp_path / "rig.xml", bodies, more=flag)
+    assert left_out(path) == ["Left out: contacts between bodies."] * said
+
+
+def test_a_pole_and_its_own_cart_do_not_touch_and_friction_of_tendons_is_left_out_aloud(tmp_path):
+    box = '<geom type="box" size="0.1 0.05 0.04" mass="0.9"/>'
+    bodies = f"<body>{SLIDE}{box}<body>{PIVOT}{STICK.format('')}</body></body>"
+    assert left_out(written(tmp_path / "rig.xml", bodies)) == []
+    disk = '<body><joint name="{}" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 0.02"/></body>'
+    for friction, said in (("", []), ('frictionloss="0.1"', ["Left out: friction of tendons."])):
+        joined = (
+            f'<tendon><fixed stiffness="2" {friction}><joint joint="a" coef="1"/><joint joint="b" coef="-1"/></fixed>'
+        )
+        path = written(tmp_path / "rig.xml", disk.format("a") + disk.format("b"), more=f"{joined}</tendon>")
+        assert left_out(path) == said
