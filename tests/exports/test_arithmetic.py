@@ -10,10 +10,10 @@ import pytest
 
 from upright.errors import BadInput
 from upright.exports.arithmetic import Language, output_lines, statements
-from upright.exports.controller import SampledController, harmless, identifiers, of_design, of_law
+from upright.exports.controller import SampledController, harmless, identifiers, of_design, of_law, of_swing_up
 from upright.exports.targets import TARGETS
 from upright.exports.vector import self_test
-from upright.laws import Law, Rule
+from upright.laws import Law, Rule, as_values
 
 TOY = Language(
     number=lambda x: f"{x:g}", reading=lambda i: f"y{i}", reference=lambda i: f"r{i}", memory=lambda i: f"z{i}",
@@ -175,6 +175,44 @@ def test_what_is_no_design_is_refused_with_what_is_missing(content, said):
         of_design(content, "x")
 
 
+def pushing(t, y, r, z, p):
+    """A rule of two readings."""
+    return (p[0] * y[1],), z
+
+
+SWING = {
+    "rule": as_values(Rule(function=pushing, parameters=[2.0], initial=[], measured=("psi", "theta"))),
+    "readings": DESIGN["readings"], "period": 0.01, "limit": 6.0, "rig": "bench 3", "command_unit": "V",
+    "swing_up": {"held": True}, "described": {"entries": {"sign.theta": {"value": -1.0}}},
+}  # fmt: skip
+
+
+def test_a_swing_up_is_read_with_its_own_limit_period_and_signs():
+    made = of_swing_up(SWING, "swing_up.json")
+    assert (made.law.limit, made.law.period, made.readings, made.signs) == (6.0, 0.01, ("psi", "theta"), (1.0, -1.0))
+    assert (made.commands, made.command_unit, made.title) == (("u",), "V", "bench 3, swing-up and catch")
+    assert made.law.function(0.0, (1.0, 3.0), (), (), (2.0,)) == ((6.0,), ())
+    bare = of_swing_up({k: v for k, v in SWING.items() if k not in ("rig", "command_unit", "described")}, "x")
+    assert (bare.title, bare.command_unit, bare.signs) == ("a rig, swing-up and catch", "", (1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ([], "x is no swing_up.json with a law; write it again with"),
+        ({k: v for k, v in SWING.items() if k != "limit"}, "x is no swing_up.json with a law"),
+        (SWING | {"swing_up": None, "verdict": "It fell."}, "of x did not end upright, so it is not exported: It fell"),
+        (SWING | {"swing_up": {"held": False}}, "did not end upright"),
+        (SWING | {"readings": DESIGN["readings"][:1]}, r"x does not hold a law \(it needs a rule of 1 readings\)"),
+        (SWING | {"rule": DESIGN["law"]}, r"does not hold a law \(it needs a rule of 2 readings\)"),
+        (SWING | {"rule": {"kind": "rule"}}, "does not hold a law"),
+    ],
+)
+def test_what_is_no_swing_up_is_refused_with_what_is_missing(content, said):
+    with pytest.raises(BadInput, match=said):
+        of_swing_up(content, "x")
+
+
 def test_a_replay_swings_about_rest_on_the_encoders_steps_while_its_reference_steps_half_way():
     """Unlimited and unrounded its largest command is one and a half limits, so that some are limited and most not."""
     made = replace(MADE, law=replace(LAW, resolution=[0.01, 0.0], windup="free"))
@@ -207,8 +245,10 @@ def test_single_precision_misses_a_sum_of_products_by_a_few_roundings_of_their_s
     assert test.single < 10 * 2.0**-24 * np.abs(exact).max()
 
 
-@pytest.mark.parametrize(("hold", "step"), [(False, 0.0), (True, 0.25), (True, 1e-7)])
-def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to_sample(hold, step):
+@pytest.mark.parametrize(
+    ("hold", "step", "begun"), [(False, 0.0, -0.4), (True, 0.25, -0.4), (True, 1e-7, -0.4), (True, 1.0, None)]
+)
+def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to_sample(hold, step, begun):
     """A memory of one number, z' = a z + b w, u = c z + d w, with its errors followed one by one.
 
     Sums of three terms (memory, reading, reference) err by five roundings of their sizes, inputs by one more. What is
@@ -218,15 +258,15 @@ def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to
     a, b, c, d = (1.0 if hold else 0.5), np.array([2.0, -0.75]), 3.0, np.array([1.5, 0.3])
     law = Law([[a]], [b], [[c]], [d], target=[0.7], initial=[0.9], references=np.zeros((1, 1)), period=0.1,
               windup="hold" if hold else "free", limit=2.0 if hold else math.inf,
-              command_resolution=step, begin=np.array([[-0.4]]))  # fmt: skip
+              command_resolution=step, begin=None if begun is None else np.array([[begun]]))  # fmt: skip
     made = of_law(law)
     test = self_test(made)
     memory = replace(law, references=test.references).follow(test.readings)[1][:, 0]
     w = np.column_stack([test.readings[:, 0] - 0.7, test.references[:, 0]])
     y = np.column_stack([test.readings[:, 0], test.references[:, 0]])
     rounded = np.float32(y).astype(float) - y - [float(np.float32(0.7)) - 0.7, 0.0]
-    moved_memory = -0.4 * rounded[0, 0]
-    error, worst, asked = 5 * eps * (0.4 * abs(w[0, 0]) + abs(memory[0])), 0.0, c * memory + w @ d
+    moved_memory, first = (begun or 0.0) * rounded[0, 0], abs(begun or 0.0) * abs(w[0, 0])
+    error, worst, asked, held = 5 * eps * (first + abs(memory[0])), 0.0, c * memory + w @ d, 0
     for k in range(len(w)):
         moved = abs(c * moved_memory + rounded[k] @ d)
         moved_memory = a * moved_memory + rounded[k] @ b
@@ -236,6 +276,8 @@ def test_single_precision_is_bounded_by_errors_that_are_handed_on_from_sample_to
         near = hold and abs(abs(asked[k]) - 2.0) <= now + step
         error = a * error + 5 * eps * (a * abs(memory[k]) + size @ np.abs(b)) + eps * (size @ np.abs(b))
         error += abs(a * memory[k] + w[k] @ b - memory[k]) if near else 0.0
+        held += near
+    assert (held > 0) == (step == 1.0) or step == 0.25
     worst = step * math.ceil(worst / step) if hold else worst
     assert test.single == pytest.approx(worst + 4 * eps * min(law.limit, np.abs(asked).max()), rel=1e-6)
 

@@ -156,9 +156,10 @@ def test_a_rule_that_takes_all_memory_gets_a_sentence(line, monkeypatch):
 
 
 @pytest.mark.skipif(shutil.which("true") is None, reason="no program here that does nothing")
-def test_a_rule_that_ends_its_process_gets_a_sentence(monkeypatch):
-    """Such as one that takes all memory there is; here there is no program to run it."""
-    monkeypatch.setattr("sys.executable", shutil.which("true"))
+@pytest.mark.parametrize("program", ["true", "false"])
+def test_a_rule_that_ends_its_process_gets_a_sentence(program, monkeypatch):
+    """Such as one that takes all memory there is; here a program runs it that does nothing, well or not."""
+    monkeypatch.setattr("sys.executable", shutil.which(program))
     with pytest.raises(BadInput, match="ended the process that it ran in"):
         replay(replace_law(run(), rule("pass", "1")))
 
