@@ -34,6 +34,12 @@ REFUSED = {
     "if n:\n    return 1.0": ("returns something in one place and nothing in another", 0),
     "OUT[0] = 2.5 << n": ("'<<' needs whole numbers", 1),
     "del n": ("'del' is not known", 1),
+    "x = (OUT, 1)": ("an array cannot be part of a tuple", 1),
+    "n[0] = 1.0": ("'n' is no array", 1),
+    "OUT[0] = round(2.5, 1)": ("round takes one number here", 1),
+    "n.real = 1": ("'n.real' cannot be assigned to", 1),
+    "n.real += 1": ("'n.real' cannot be added to", 1),
+    "OUT[0] = max(())": ("max of nothing", 1),
 }  # fmt: skip
 
 
@@ -44,3 +50,21 @@ def test_what_the_text_may_not_use_is_said_with_its_line(body):
         compiled("@entry\ndef entered(OUT, n):\n" + textwrap.indent(body, "    "))(np.zeros(3), 2)
     assert words in caught.value.what
     assert caught.value.line == (line and line + 1)  # the function itself begins in the first
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("OUT[0] = twice(1.0, 2.0)", "twice takes 1 arguments, got 2"),
+        ("OUT[0] = twice()", "twice takes 1 arguments, got 0"),
+        ("OUT[0] = put(OUT)", "'put' returns nothing"),
+    ],
+)
+def test_a_function_of_the_text_is_called_as_it_is_written(call, words):
+    helpers = "def twice(x):\n    return 2.0 * x\ndef put(OUT):\n    OUT[1] = 3.0\n"
+    with pytest.raises(Unsupported) as caught:
+        compiled(f"{helpers}@entry\ndef entered(OUT, n):\n    {call}\n")(np.zeros(3), 2)
+    assert words in caught.value.what
+    out = np.zeros(3)
+    compiled(f"{helpers}@entry\ndef entered(OUT, n):\n    OUT[0] = twice(n)\n    put(OUT)\n")(out, 2)
+    assert out.tolist() == [4.0, 3.0, 0.0]
