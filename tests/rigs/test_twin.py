@@ -153,3 +153,14 @@ def test_a_broken_encoder_shows_what_it_should(fault, shown):
         port.hold("hanging", [counts / RIG.per_unit[0], 0.0, 0.0, 0.0])
         assert abs(port.read()[0] - shown(counts)) <= 1
         assert port.read()[1] == 0
+
+
+def test_a_twin_s_time_is_that_of_the_periods_that_passed_held_or_not():
+    port = TwinPort(RIG)
+    assert port.advance() == RIG.period
+    port.hold("inverted", [0.0, 0.0, 0.05, 0.0])
+    assert port.advance() == 2 * RIG.period
+    assert port.x[2] == RIG.plant.state("inverted")[2] + 0.05
+    port.let_go()
+    assert port.advance() == 3 * RIG.period
+    assert port.x[2] != RIG.plant.state("inverted")[2] + 0.05
