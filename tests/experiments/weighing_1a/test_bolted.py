@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from dataclasses import replace
 
@@ -13,8 +14,10 @@ from upright.errors import BadInput, RigStopped
 from upright.experiments.laboratory import chosen_experiments
 from upright.experiments.stand.live import LiveStand, live_stand
 from upright.experiments.stand.studies import write_study
+from upright.experiments.weighing_1a import run as weighing
 from upright.experiments.weighing_1a.run import PROBE, _bolted, step_stand
 from upright.readers import read
+from upright.records import Provenance, Record
 
 STUDY = """
 [rig]
@@ -155,3 +158,49 @@ def test_a_delay_that_nobody_said_is_found_where_nothing_else_is_late(tmp_path, 
         rig = live_stand(tmp_path / "RIG.toml")
     written = write_study(rig, tmp_path / "found.toml", "", [])
     assert tomllib.loads(written.read_text(encoding="utf-8"))["actuator"]["delay"] == there
+
+
+def test_every_loading_is_stepped_once_as_far_as_the_probe_says_for_ten_of_the_slowest_swings(tmp_path, monkeypatch):
+    """A volt puts the cart at 10 mm, and it swings to 20: 1.5 V for the 15 mm that are wanted of a travel of 60."""
+    stand = made(tmp_path)
+    runs, told, weighed = [], [], {}
+
+    def run(_self, samples, _folder, stem, *, bolted):
+        u = np.array(samples)
+        runs.append((stem, u, bolted))
+        return Record(t=np.arange(u.size) * stand.rig.period, signals={"x_1": 0.02 * u, "u_applied": u},
+                      provenance=Provenance(file=f"{stem}.mcap"))  # fmt: skip
+
+    def weigh(logs, values, signals, commands, *, tolerance):
+        weighed.update(logs=logs, values=values, signals=signals, commands=commands, tolerance=tolerance)
+        return "line", ()
+
+    monkeypatch.setattr(LiveStand, "run", run)
+    monkeypatch.setattr(weighing, "weigh", weigh)
+    done = step_stand(stand, tmp_path / "1a", lambda step, share: told.append((step, share)))
+    assert [stem for stem, *_ in runs] == ["probe", "loaded_1", "loaded_2", "loaded_3"]
+    values = [0.0, 0.5, 1.0]
+    assert [b for *_, b in runs] == _bolted(stand, [0.0, *values])
+    assert told == [(f"stepping with {m} kg added", i / 4) for i, m in enumerate(("0", "0", "0.5", "1"))]
+    p = stand.rig.plant.parameters()
+    seconds = 10 * 2 * math.pi / math.sqrt(p["k_1"] / (p["m_1"] + p["a_1"] + max(values)))
+    still = math.ceil(0.5 / stand.rig.period)
+    for _, u, _ in runs:
+        assert not u[:still].any()
+        forth, rest, back, end = np.split(u[still:], 4)
+        assert forth.size * stand.rig.period == pytest.approx(seconds, abs=stand.rig.period)
+        assert len({*forth}) == len({*back}) == 1
+        assert forth[0] == -back[0] > 0
+        assert not rest.any()
+        assert not end.any()
+    steps = [u.max() for _, u, _ in runs]
+    assert steps == pytest.approx([PROBE * 300 * 0.015 / 5, 1.5, 1.5, 1.5])  # the first by the guesses
+    assert list(weighed["logs"]) == ["0 kg", "0.5 kg", "1 kg"]  # the probe is no loading
+    assert weighed["values"] == values
+    assert set(weighed["signals"].values()) == {"x_1"}
+    assert set(weighed["commands"].values()) == {"u_applied"}
+    assert weighed["tolerance"] == stand.tolerance
+    assert (done.loadings, list(done.files.values())) == ("line", ["loaded_1.mcap", "loaded_2.mcap", "loaded_3.mcap"])
+    assert list(done.added.values()) == values
+    assert (done.truth["k"], done.truth["c"]) == (stand.truth["k_1"], stand.truth["c_1"])
+    assert stand.truth["m_1"] in done.truth.values()

@@ -84,7 +84,10 @@ def test_logs_of_one_name_keep_apart_and_weigh_what_their_frequencies_say():
 @pytest.mark.parametrize("named", [False, True])
 def test_a_twin_is_weighed_again_from_its_logs_where_a_folder_keeps_them(tmp_path, monkeypatch, named):
     """With no mass and four, once each: what its swings say lies by the true stiffness, and its steps can be typed."""
-    body = measure_body(drawn_twin(4, "rectilinear"), counts=(0, 2, 4), shots=1)
+    told = []
+    twin = drawn_twin(4, "rectilinear")
+    body = measure_body(twin, lambda step, share: told.append((step, share)), counts=(0, 2, 4), shots=1)
+    assert told == [(f"stepping with {n} masses", pytest.approx(i / 3)) for i, n in enumerate((0, 2, 4))]
     monkeypatch.setattr(from_logs, "measure_body", lambda on: body)
     loadings, page = from_logs.weigh_twin("rectilinear", 4, tmp_path if named else None)
     true = drawn_twin(4, "rectilinear")
