@@ -105,6 +105,11 @@ def test_the_chapter_s_table_of_drift_is_in_degrees_or_centimetres(make, rows, u
 def test_frames_are_right_handed_and_turned_by_the_angles_that_are_drawn():
     """Where axis i points along s z, s = +-1, of a page with x to the right and y up, the next two are i x j = k."""
     above, outside = frames_figure().axes
+    for ax in (above, outside):
+        drawn = [xy for line in ax.lines for xy in zip(*line.get_data(), strict=True)]
+        drawn += [t.get_position() for t in ax.texts] + [t.xy for t in ax.texts if not t.get_text()]
+        (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+        assert all(left < x < right and low < y < high for x, y in drawn)  # nothing is cut off
     for ax, out, fixed, turned, first, second, name in (
         (above, -1, "n", "a", 2, 3, "psi"),  # axis 1 into the page, (-z) x 2 = 3
         (outside, 1, "a", "b", 1, 3, "theta"),  # axis 2 out of it, 3 = 1 x z

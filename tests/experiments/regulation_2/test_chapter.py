@@ -159,3 +159,15 @@ def test_no_probability_is_printed_of_a_model_that_is_not_trusted(ran):
     page = chapter(variants(ran)["not trusted"])
     assert page.verdict.startswith("Do not rely on this")
     assert not re.search(r"probability[^.]*\d+ %", page.verdict + shown(page))
+
+
+@pytest.mark.parametrize(("counts", "still"), [(1.9, True), (2.1, False)])
+def test_a_cart_that_rests_within_two_counts_of_its_own_encoder_is_still(ran, counts, still):
+    """Its counts are per metre, the pendulum's per turn: one is ninety times the other."""
+    fine, coarse = ran.rig.resolution
+    assert coarse > 50 * fine
+    page = chapter(changed(ran, score={"final": np.array([counts * fine, 0.0]), "settled": 0.5, "at_limit": 0.0}))
+    table = next(b for p in page.parts for b in p.content if isinstance(b, Table))
+    measured = [row[-1] for row in table.rows[1::2]]
+    assert len(measured) == 2
+    assert all((cell == "still") == still for cell in measured)

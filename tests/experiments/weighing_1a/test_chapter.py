@@ -13,7 +13,7 @@ import pytest
 
 from tests.report.rendering import Rendered
 from upright.experiments.stand.known import Known
-from upright.experiments.weighing_1a.chapter import added_options, chapter, loading_chapter
+from upright.experiments.weighing_1a.chapter import HandedOn, added_options, chapter, loading_chapter
 from upright.experiments.weighing_1a.figures import (
     decrement_figure,
     extremes_figure,
@@ -261,3 +261,11 @@ def test_what_is_handed_on_stands_beside_the_true_value_with_its_standard_error(
     (cover,) = chapter(done).findings
     low, high = (float(n) for n in cover.interval.replace("·10⁻³", "e-3").split(" to "))
     assert (high - low) / 2 == pytest.approx(1.96 * 2e-3 * true, rel=0.05)
+
+
+@pytest.mark.parametrize(("value", "off"), [(1.25, 25.0), (0.75, 25.0), (1.0, 0.0)])
+def test_what_is_handed_on_is_off_by_its_distance_over_the_truth_in_percent(value, off):
+    assert HandedOn(name="m_1", value=value, stderr=0.1, truth=1.0, unit="kg").off == pytest.approx(off)
+    for errors, inside in ((1.95, True), (1.97, False)):
+        one = HandedOn(name="m_1", value=1.0 + errors * 0.1, stderr=0.1, truth=1.0, unit="kg")
+        assert one.inside == inside
