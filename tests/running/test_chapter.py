@@ -27,7 +27,7 @@ JITTER = Jitter(
 
 
 def test_lateness_is_told_in_microseconds_and_as_shares_of_its_ticks():
-    """A thousand and one ticks of 2 ms are 2 s at 500 Hz, each 20 us behind; work from 0 to 100 us has its median at 50."""
+    """A thousand and one ticks of 2 ms are 2 s at 500 Hz, each 20 us behind; of work from 0 to 100 us half is 50."""
     page = jitter_chapter(replace(JITTER, late=25, stolen=0.25))
     facts = dict(page.parts[0].content[0].pairs)
     assert page.parts[0].title == "2 s at 500 Hz"
