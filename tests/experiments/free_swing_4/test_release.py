@@ -236,3 +236,15 @@ def test_a_cart_s_momentum_is_what_its_release_gave_it():
 def test_what_has_no_pendulum_cannot_swing_one():
     with pytest.raises(BadInput, match="needs a pendulum"):
         freed(make_rig("rectilinear"))
+
+
+def test_a_path_ends_where_it_is_from_where_it_was_let_go(monkeypatch):
+    """From 0.3 to 0.3 + 0.5 in its last two seconds, wherever it was in between."""
+    t = np.arange(0.0, 10.0, 0.01)
+    psi = np.where(t > t[-1] - 2.0, 0.8, 5.0)
+    psi[0] = 0.3
+    monkeypatch.setattr(drift, "motion", lambda rig, release, *, seconds: (t, np.column_stack([psi, psi])))
+    path = drift.drift_path("free", twin(0), None, seconds=10.0)
+    assert path.end == pytest.approx(0.5)
+    assert path.slope == pytest.approx(np.polyfit(t, psi, 1)[0])
+    assert not path.remedy

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, NotIdentifiable
-from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
+from upright.experiments.frequency_1b.run import LogRequest, _step, response_of_logs
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Record
 
@@ -123,3 +123,8 @@ def test_logs_of_different_periods_are_refused(tmp_path):
     log.replace(t=1.5 * log.t).to_csv(tmp_path / "b.csv")
     with pytest.raises(NotIdentifiable, match="need one period, and hold 10 and 15 s"):
         response_of_logs([first, tmp_path / "b.csv"], request(), tmp_path / "out")
+
+
+@pytest.mark.parametrize(("column", "step"), [([0.0, 0.5, 2.0, 0.5], 0.5), ([3.0, 3.0, 3.0], 0.0), ([1.0, -1.0], 2.0)])
+def test_the_smallest_step_of_a_column_is_its_resolution_and_one_that_never_moves_has_none(column, step):
+    assert _step(np.array(column)) == step

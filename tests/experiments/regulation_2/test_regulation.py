@@ -15,6 +15,7 @@ from upright.basis import DESCRIBED, SIMULATED
 from upright.control.score import outcomes
 from upright.errors import BadInput
 from upright.experiments.regulation_2 import chapter as regulation_page
+from upright.experiments.regulation_2 import run as regulation
 from upright.experiments.regulation_2.run import (
     Regulation,
     RegulationRequest,
@@ -311,7 +312,7 @@ def test_a_way_to_the_velocities_is_as_restless_as_its_command_is_from_sample_to
         np.testing.assert_allclose(way.run.x[0] - [0, 0, math.pi, 0], actual_start(predicted.task, 0), atol=1e-9)
 
 
-def test_a_stop_after_a_set_leaves_out_the_others_and_the_ways(tmp_path):
+def test_a_stop_after_a_set_leaves_out_the_others_and_the_ways(tmp_path, monkeypatch):
     """And the share told never goes back; without a word of the start it is the make's."""
     known, told = completed(fit_of(make_rig("linear"), spread=0.0)), []
     wish = RegulationRequest(draws=2, seconds=0.1)
@@ -331,3 +332,6 @@ def test_a_stop_after_a_set_leaves_out_the_others_and_the_ways(tmp_path):
     assert told == sorted(told)
     assert 0.0 <= told[0] <= told[-1] <= 1.0
     assert (tmp_path / "regulation_set_1.csv").exists()
+    monkeypatch.setattr(regulation, "make_of_vendor", lambda vendor, plant: None)
+    own = run_regulation(known, None, 0, tmp_path, stopped=lambda: True, request=replace(wish, push=0.2))
+    assert own.task.start == (0.0, 0.0, math.radians(5), 0.2)  # of a rig that nobody makes

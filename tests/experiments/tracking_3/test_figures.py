@@ -232,3 +232,13 @@ def test_colours_differ_from_law_to_law():
     drawing = steps_figure(tracking(), [outcome(law) for law in (SET_1, SET_4, SUM, PD, FAR)])
     lines = [curves(drawing.axes[0])[law.name] for law in (SET_1, SET_4, SUM, PD, FAR)]
     assert len({line.get_color() for line in lines}) == 5
+
+
+def test_a_command_that_holds_a_spring_is_no_unrest_and_a_ripple_about_it_is():
+    """2 V all the while rest; with 0.3 V of a sine about them the rms is 0.3/sqrt(2)."""
+    for ripple in (0.0, 0.3):
+        held = motion(volts=0.0)
+        held.u[held.t >= 0.1] = 2.0
+        held.u[:] += ripple * np.sin(2 * math.pi * 25 * held.t)
+        rest = figured(held, SIZE).rest
+        assert rest.rms * RIG.limit == pytest.approx(ripple / math.sqrt(2), abs=0.02 * ripple + 1e-9)
