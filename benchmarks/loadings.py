@@ -20,7 +20,7 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
 
     lines: list[Line] = []
     seeds = range(1, 6 if quick else 101)
-    measure_body(drawn_twin())  # compiles
+    measure_body(drawn_twin(0, "rectilinear"))  # compiles
     for kind in BODIES:
         progress(kind)
         done, each = of_each(lambda seed, kind=kind: measure_body(drawn_twin(seed, kind)), seeds)

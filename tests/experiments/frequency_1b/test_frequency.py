@@ -16,7 +16,17 @@ from upright.experiments.frequency_1b import run as frequency_run
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_charts
 from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
-from upright.experiments.frequency_1b.sweeps import EVERY, SHARE, _probed, broadband, collect, grid, sines, stepped_sine
+from upright.experiments.frequency_1b.sweeps import (
+    EVERY,
+    SHARE,
+    _dwell,
+    _probed,
+    broadband,
+    collect,
+    grid,
+    sines,
+    stepped_sine,
+)
 from upright.experiments.stand.known import Known, bench, model_of
 from upright.identification.frequency.answer import explain, key_value
 from upright.identification.frequency.response import FrequencyResponse
@@ -460,3 +470,24 @@ def test_the_response_of_a_study_is_that_of_its_fitted_runs(tmp_path, roles):
     held.write_text(text.replace('"fit"', '"predict"'), encoding="utf-8")
     with pytest.raises(BadInput, match="needs fitted runs"):
         frequency_run._study(held, None)
+
+
+@pytest.mark.parametrize(("until", "settles"), [(8, True), (27, False)])
+def test_a_sine_that_settles_too_late_is_measured_over_its_last_periods_and_said_not_to_have(until, settles):
+    """Thirty periods, of which the first ones jump about; of the last six, or as many as a second has, all are kept."""
+    rig = make_rig("torsional")
+    tick = rig.period * EVERY
+    length = 100
+    wanted = max(6, int(np.ceil(1.0 / (length * tick))))
+    n = np.arange((30 + wanted) * length)
+    wave = 0.1 * np.sin(2 * np.pi * n / length)
+    jumps = np.random.default_rng(2).normal(0, 0.1, n.size) * (n < (until + wanted - 6) * length)
+    y = np.column_stack([wave + jumps, 0.5 * wave])
+    dwell = _dwell(rig, 2 * np.pi / (length * tick), length, wave, y, 0.1, 6)
+    assert len(dwell.record) == wanted * length
+    assert np.isfinite(dwell.settle) == settles
+    if settles:
+        assert dwell.settle >= (until + wanted - 6) * length * tick
+        assert dwell.record.t[0] == pytest.approx(dwell.settle)
+    else:
+        assert dwell.record.t[-1] == pytest.approx((n.size - 1) * tick)

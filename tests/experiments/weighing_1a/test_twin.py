@@ -98,3 +98,21 @@ def test_least_squares_on_the_whole_motion_agrees(kind):
 def test_a_piece_weighs_what_the_laboratory_says():
     assert BODIES["rectilinear"].piece == 0.5
     assert BODIES["torsional"].piece == pytest.approx(0.5 * (0.065**2 + 0.025**2 / 2))  # parallel axes
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_twins_of_a_kind_differ_by_some_percent_and_their_friction_by_a_fifth(kind):
+    """Of 300: scatter of logarithms 4 and 6 %, 20 % of friction, each to 4/sqrt(600); seed 0 is as designed."""
+    body = BODIES[kind]
+    design = body.rig.plant.parameters()
+    nominal = drawn_twin(0, kind)
+    assert (nominal.rig, set(nominal.pieces)) == (body.rig, {body.piece})
+    drawn = [drawn_twin(seed, kind) for seed in range(1, 301)]
+    for name, spread in ((body.inertia, 0.04), ("k_1", 0.06), ("c_1", 0.2), ("f_1c", 0.2)):
+        off = np.log([on.rig.plant.parameters()[name] / design[name] for on in drawn]) / spread
+        assert abs(off.mean()) < 4 / np.sqrt(300)
+        assert np.std(off) == pytest.approx(1.0, abs=4 / np.sqrt(600))
+    pieces = (np.array([on.pieces for on in drawn]) / body.piece - 1) / body.tolerance
+    assert pieces.shape == (300, 4)
+    assert np.std(pieces) == pytest.approx(1.0, abs=4 / np.sqrt(2400))
+    assert [on.rig.seed for on in drawn] == list(range(1, 301))
