@@ -175,7 +175,7 @@ class _Drawing:
             outward = path[len(path) // 2] - self._flat(first[0])[0]
         else:
             low = float(self._flat(first)[:, 1].max()) + 24
-            path = np.vstack([[self._flat(p.mean(axis=0))[0, 0], low] for p in lines])
+            path = np.vstack([[self._flat(_middle(p))[0, 0], low] for p in lines])
             self._line(
                 np.array([[path[0, 0], low + 6], [path[0, 0], self._flat(first)[:, 1].min()]]), grey, 1.2, dashes
             )
@@ -185,8 +185,8 @@ class _Drawing:
         outward = outward / (np.linalg.norm(outward) or 1.0)
         at = path[len(path) // 2] + outward * 17
         self._write(at[0], at[1] + 6, self.names[i], colour)
-        zero = self._flat(first[-1] if turns else first.mean(axis=0))[0]
         if turns:
+            zero = self._flat(first[-1])[0]
             away = zero - self._flat(first[0])[0]
             zero = zero + away / (np.linalg.norm(away) or 1.0) * 16
             rest = ", hanging" if self.plant.equilibria.get("hanging", {}).get(self.names[i]) == 0 else ""
@@ -236,3 +236,8 @@ class _Drawing:
             f' fill="{colour}" style="paint-order:stroke;stroke:var(--paper, #fff);stroke-width:4px">'
             f"{italic}{blank}{rest}</text>"
         )
+
+
+def _middle(points: Array) -> Array:
+    """Middle of a body; the corners of one that is closed have its first twice."""
+    return (points.min(axis=0) + points.max(axis=0)) / 2
