@@ -17,11 +17,12 @@ def march(
     """
     states, applied = np.zeros((len(commands), len(start))), np.clip(commands, -limit, limit)
     x = start
-    for k in range(len(commands)):
-        states[k] = x
-        if not np.isfinite(x).all():
-            return states[: k + 1], applied[: k + 1]
-        if gains is not None:
-            applied[k] = np.clip(commands[k] - gains @ x[: gains.shape[1]], -limit, limit)
-        x = A @ x + B @ applied[k]
+    with np.errstate(over="ignore", invalid="ignore"):  # what runs away is handed back as far as it goes
+        for k in range(len(commands)):
+            states[k] = x
+            if not np.isfinite(x).all():
+                return states[: k + 1], applied[: k + 1]
+            if gains is not None:
+                applied[k] = np.clip(commands[k] - gains @ x[: gains.shape[1]], -limit, limit)
+            x = A @ x + B @ applied[k]
     return states, applied
