@@ -110,11 +110,14 @@ def test_a_richer_model_that_was_led_astray_is_fitted_from_the_end_of_the_poorer
     runs = swings(0, **truth)
     ends: list[tuple[Problem, np.ndarray, float]] = []
 
-    def astray(problem: Problem, candidates: Sequence[np.ndarray], log: SearchLog, *, patient: bool = True) -> Descent:
+    def astray(
+        problem: Problem, candidates: Sequence[np.ndarray], log: SearchLog, *, patient: bool, stairs: bool
+    ) -> Descent:
+        assert not stairs  # the simplex waits until a model is chosen
         assert patient is (
             not ends
         )  # more attempts than one for the first model, which has no poorer one to start from
-        found = search(problem, candidates, log, patient=patient)
+        found = search(problem, candidates, log, patient=patient, stairs=stairs)
         if len(ends) == 2:
             none = {"b_2c": 0.0, "b_2q": 0.0}
             poorest, below = (problem.place(none | p.values_at(x)) for p, x, _ in ends)

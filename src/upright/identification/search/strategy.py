@@ -100,8 +100,13 @@ def closed_form_starts(rig: GreyBox, runs: Sequence[Run]) -> list[dict[str, floa
     return starts
 
 
-def search(problem: Problem, candidates: Sequence[Array], log: SearchLog, *, patient: bool = True) -> Descent:
-    """Best of several starts, walked over a growing horizon; more attempts when what comes out is poor."""
+def search(
+    problem: Problem, candidates: Sequence[Array], log: SearchLog, *, patient: bool = True, stairs: bool = True
+) -> Descent:  # fmt: skip
+    """Best of several starts, walked over a growing horizon; more attempts when what comes out is poor.
+
+    Without `stairs` no simplex is among these.
+    """
     h = min(problem.duration, first_horizon(problem))
     ranked = _ranked(problem, candidates, h)
     log.best = problem, ranked[0]
@@ -118,6 +123,8 @@ def search(problem: Problem, candidates: Sequence[Array], log: SearchLog, *, pat
         attempts += 1
         if others:
             x, name = others.pop(0), "another start"
+        elif not stairs:
+            break
         else:
             name = "simplex"
             x, _ = simplex(problem, ranked[0], log, horizon=h, limit=400)
