@@ -95,6 +95,19 @@ def test_viscous_friction_that_took_the_part_of_dry_friction_has_an_interval_tha
     assert b_1.interval[0] <= FURUTA["b_1"] <= b_1.interval[1]
 
 
+def test_viscous_friction_that_a_study_leaves_out_is_named_although_dry_friction_took_its_part() -> None:
+    """Dry friction loses as much of these swings, and with the wrong share of them at every amplitude."""
+    asked = rig(Furuta, {**FURUTA, "b_1": 0.0}, {"J_d": 0.006, "b_1c": 2e-3})
+    fit = identify(asked, [driven("one", "fit", 0.0)])
+    (said,) = [w for w in fit.warnings if "viscous friction that the model leaves out" in w]
+    low, high = (float(word.strip("():")) for word in said.split("N m s/rad (")[1].split(")")[0].split(" to "))
+    assert low <= FURUTA["b_1"] <= high
+    assert "[parameters] b_1 = { guess =" in said
+    b_1c = fit.estimates["b_1c"]
+    assert b_1c.value > 1.1 * FURUTA["b_1c"]
+    assert b_1c.interval[0] <= FURUTA["b_1c"] <= b_1c.interval[1]
+
+
 def test_no_dry_friction_is_told_where_it_is_asked_for_or_not_there(pulled) -> None:
     assert not any("dry friction that" in w for w in pulled.warnings)
     smooth = {**FURUTA, "b_1c": 0.0, "b_2c": 0.0}

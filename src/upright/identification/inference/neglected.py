@@ -1,4 +1,4 @@
-"""What a model leaves out and the runs show: a constant force, dry friction, a drive that acts late.
+"""What a model leaves out and the runs show: a constant force, friction, a drive that acts late.
 
 A frame that is not level, an amplifier's offset, a cable that pulls: none of it is in most models, and the others then
 take its part, friction first, as well in this run as it can be done, and differently in the next. So do viscous terms
@@ -30,6 +30,7 @@ from upright.identification.model.grey_box import NOISE, Parameter, neutral
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.unknowns import shared_unknowns
 from upright.identification.search.descent import descend
+from upright.identification.search.starts import viscous_terms
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ SHOWN = 2.0
 """Standard errors from which on it counts as there: one right model in twenty then has intervals that are too wide."""
 
 HALVED = 0.5
-"""Share of the cost that may be left with dry friction, which a right model never lowers so far: its levels are sought
+"""Share of the cost that may be left with friction, which a right model never lowers so far: its levels are sought
 from zero, where whatever else is missing may look a little like it."""
 
 
@@ -119,7 +120,12 @@ class Neglected:
 
 def neglected(best: Optimum) -> tuple[Neglected, ...]:
     """The forces that the runs show; none that is asked for, or known, or not to be seen, or not there."""
-    forces = (_constant_force(best), *(_dry_friction(best, j.coulomb) for j in best.problem.rig.plant.derived().joints))
+    derived = best.problem.rig.plant.derived()
+    forces = (
+        _constant_force(best),
+        *(_friction(best, j.coulomb, "dry") for j in derived.joints),
+        *(_friction(best, name, "viscous") for name in viscous_terms(derived)),
+    )
     return tuple(force for force in forces if force is not None)
 
 
@@ -134,12 +140,14 @@ def _constant_force(best: Optimum) -> Neglected | None:
     return _shown(best, parameter, means, left=1.0)
 
 
-def _dry_friction(best: Optimum, name: str) -> Neglected | None:
-    if not name or any(track.ahead for track in best.problem.tracks):
+def _friction(best: Optimum, name: str, kind: str) -> Neglected | None:
+    plant = best.problem.rig.plant
+    if not name or neutral(plant, name) != 0 or any(track.ahead for track in best.problem.tracks):
         return None
-    quantity = best.problem.rig.plant.quantity(name)
+    quantity = plant.quantity(name)
     parameter = Parameter(name=name, value=0.0, unit=quantity.unit, estimate=True, lower=0.0)
-    return _shown(best, parameter, f"dry friction that the model leaves out, {name} ({quantity.meaning}) = ", HALVED)
+    means = f"{kind} friction that the model leaves out, {name} ({quantity.meaning}) = "
+    return _shown(best, parameter, means, HALVED)
 
 
 def _shown(best: Optimum, parameter: Parameter, means: str, left: float) -> Neglected | None:

@@ -24,7 +24,7 @@ from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.problem.unknowns import Unknown, shared_unknowns
 from upright.identification.search.descent import descend
 from upright.physics.actuator import ACTUATOR, drive_force
-from upright.physics.equations import evaluated, mass_and_force
+from upright.physics.equations import Derived, evaluated, mass_and_force
 from upright.physics.plant import Plant
 from upright.signals.smoothing import (
     dominant_period,
@@ -228,7 +228,7 @@ def friction_from_energy(rig: GreyBox, samples: list[Sample], values: Mapping[st
     for joint in derived.joints:
         kinds += [(joint.coulomb, joint.direction, 1), (joint.quadratic, joint.direction, 3)]
     kinds = [k for k in kinds if k[0]]
-    viscous = [n for n in derived.parameters if _mentions(derived.power_lost, n)]
+    viscous = viscous_terms(derived)
     sought = [n for n in (*viscous, *(k[0] for k in kinds)) if n in estimated]
     if not sought:
         return {}
@@ -283,6 +283,11 @@ def _cuts(s: Sample) -> NDArray[np.int64]:
         cuts -= (s.v[i][cuts] > 0) != (s.v[i][cuts - 1] > 0)  # the last sample on the way there
         return cuts[(cuts >= edge) & (cuts < n - edge)]
     return np.arange(edge, n - edge, max(1, int(s.period / 2 / s.dt)), dtype=np.int64)
+
+
+def viscous_terms(derived: Derived) -> list[str]:
+    """Parameters that Rayleigh's dissipation mentions."""
+    return [n for n in derived.parameters if _mentions(derived.power_lost, n)]
 
 
 def _mentions(expression: str, name: str) -> bool:
