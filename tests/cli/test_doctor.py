@@ -38,6 +38,25 @@ def test_a_sound_log_is_exit_code_0_and_says_what_was_looked_for(tmp_path: Path)
     assert "upright init" in told
 
 
+def test_a_rig_model_and_a_rig_file_stand_for_what_describes_them(tmp_path: Path) -> None:
+    """`frequency --rig linear` names the crane, and the RIG.toml that `run` takes names a study or a rig model."""
+    path = log(tmp_path)
+    study = tmp_path / "study.toml"
+    study.write_text('[rig]\nplant = "pendulum"\n[parameters]\nm_p = "0.1 kg"\nl_cg = "0.2 m"\n', encoding="utf-8")
+    rigs = {"furuta.toml": 'make = "furuta"', "described.toml": 'study = "study.toml"'}
+    for name, described in rigs.items():
+        (tmp_path / name).write_text(f'kind = "twin"\n{described}\n', encoding="utf-8")
+
+    def unchecked(rig: object) -> dict[str, str]:
+        return json.loads(doctor(path, "--rig", rig, "--json").stdout)["unchecked"]
+
+    assert unchecked("linear") == unchecked("cart-pendulum")
+    assert unchecked(tmp_path / "furuta.toml") == unchecked("furuta")
+    assert unchecked(tmp_path / "described.toml") == unchecked(study)
+    refused = doctor(path, "--rig", "rectilinaer")
+    assert (refused.exit_code, "?." in refused.stderr) == (2, False)
+
+
 def test_lost_counts_are_exit_code_3_with_a_picture(tmp_path: Path) -> None:
     path = log(tmp_path, theta=SWING + np.where(T > 2.2, 0.15, 0.0))
     page = tmp_path / "out" / "page.html"

@@ -194,9 +194,9 @@ def read_known(text: str, log: str = "") -> tuple[Rig | type[Plant], Wiring]:
     try:
         return find(text), Wiring()
     except BadInput as error:
+        unknown = f"{str(error).rstrip('.')}.".replace("?.", "?")
         raise BadInput(
-            f"--rig {text}: {str(error).rstrip('.')}. A rig is a plant's name, a study (TOML), a fit.json or an MJCF "
-            "file."
+            f"--rig {text}: {unknown} A rig is a plant's name, a study or RIG.toml, a fit.json or an MJCF file."
         ) from None
 
 

@@ -161,7 +161,7 @@ def _stem(log: Path) -> str:
     "Log",
     names={"html": "-o --html"},
     metavars={"rig": "RIG", "html": "FILE"},
-    helps={"rig": "Plant (furuta, torsional-2, ...), study (TOML) or fit.json of the rig."},
+    helps={"rig": "Plant (furuta, torsional-2, ...), rig model, study or RIG.toml, or fit.json."},
     prepare=lambda typed: typed if typed["html"] or not typed["pdf"] else {**typed, "html": _page_of(typed["log"])},
     wrong=lambda answer: bool(answer.value.wrong),
     more="""
@@ -191,8 +191,8 @@ def doctor(
     log : path, Record or pandas.DataFrame
         Log as its program wrote it.
     rig : str, path, fit, rig or plant, optional
-        Name of the plant, study (TOML) or fit.json of the rig, or what `identify` answered; with it signs, and with
-        known inertias scales, are examined too.
+        Name of the plant or rig model, study or RIG.toml, or fit.json of the rig, or what `identify` answered; with it
+        signs, and with known inertias scales, are examined too.
     html : path, optional
         Page to write, with a picture of every finding.
     pdf : bool
@@ -244,15 +244,27 @@ def _page_of(log: Path) -> Path:
 
 
 def _known(rig: Any, log: str) -> tuple[Rig | type[Plant] | None, Wiring | None]:
-    """The rig by a name or a file, which may say how it is wired, or as an object with its numbers."""
-    from upright.diagnosis.case import read_known
+    """The rig by a name or a file, which may say how it is wired, or as an object with its numbers.
+
+    Of a rig model its plant, of a RIG.toml what describes it.
+    """
+    from upright.diagnosis.case import Wiring, read_known
     from upright.physics import Plant
+    from upright.rig.makes import MAKES
+    from upright.rigs.rigfile import read_rig_file
+    from upright.study.text import StudyText
     from upright.verbs.handover import rig_of
 
     if rig is None:
         return None, None
     if isinstance(rig, str | os.PathLike):
-        return read_known(str(rig), log) if str(rig) else (None, None)
+        text = str(rig)
+        if text.endswith(".toml") and "kind" in StudyText(Path(text)).root():
+            described = read_rig_file(Path(text))
+            text = described.make or "" if described.known is None else str(described.known)
+        if text in MAKES:
+            return type(MAKES[text].rig.plant), Wiring()
+        return read_known(text, log) if text else (None, None)
     if isinstance(rig, type) and issubclass(rig, Plant):
         return rig, None
     return rig_of(rig, "doctor", draws=0), None
