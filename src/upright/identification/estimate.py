@@ -20,7 +20,13 @@ from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
-from upright.identification.inference.intervals import run_estimates, shared_estimates, widened, with_model_uncertainty
+from upright.identification.inference.intervals import (
+    run_estimates,
+    shared_estimates,
+    widened,
+    with_model_uncertainty,
+    with_valleys,
+)
 from upright.identification.inference.loop import standing
 from upright.identification.inference.neglected import is_driven, lateness, neglected, with_force
 from upright.identification.inference.poles import poles, shared_values
@@ -296,6 +302,7 @@ def _conclude(
             n: widened(estimates[n], i) for n, i in force.intervals.items() if estimates[n].status not in FIXED
         }
         warnings.append(force.sentence())
+    estimates, alike = (estimates, "") if brief or little else with_valleys(estimates, best, log)
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
     bands = None if bands is None else reduce(with_force, forces, bands)
@@ -333,6 +340,7 @@ def _conclude(
             nothing=best.explains_nothing,
             ties=tied,
             driven=is_driven(best),
+            alike=alike,
         )
     )
     return Fit(

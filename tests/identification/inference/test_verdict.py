@@ -148,7 +148,8 @@ def test_an_inertia_over_four_decades_is_no_number_to_use() -> None:
     assert answers[1].answer == "no"
     assert not trusted(answers)
     assert any("J_p lies anywhere from 0.00027 to 83 kg m^2" in r for r in answers[1].reasons)
-    assert _judged({"a": _score("fit", 99.0, None)}, {"b_2": firm})[1].answer == "yes"
+    tested = {"a": _score("fit", 99.0, None), "b": _score("predict", 99.0, None)}
+    assert _judged(tested, {"b_2": firm})[1].answer == "yes"
 
 
 def test_no_answer_is_better_than_the_prediction_it_rests_on() -> None:

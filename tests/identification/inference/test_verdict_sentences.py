@@ -45,6 +45,10 @@ def firm(value: float = 2e-3, **fields: Any) -> Estimate:
     return Estimate(**{"value": value, "stderr": 1e-5, "interval": (0.95 * value, 1.05 * value), "unit": "kg"} | fields)
 
 
+TESTED = {"a": score(theta=99.0), "b": score("predict", theta=95.0)}
+"""A run that was fitted, and one that was held out and is predicted."""
+
+
 def predicts(*runs: tuple[str, RunScore], **more: Any) -> Judgement:
     return judged(dict(runs), **more)[0]
 
@@ -243,18 +247,37 @@ def test_numbers_of_a_model_that_does_not_predict_are_usable_in_part_and_so_is_i
 def test_trust_asks_the_first_two_questions_only() -> None:
     growth = Standing(at="inverted", growth=firm(10.0), share=0.0)
     told = judged(estimates={"J_p": firm()}, standing=growth)
-    assert [a.answer for a in told] == ["not tested", "yes", "no"]
+    assert [a.answer for a in told] == ["not tested", "in part", "no"]
     assert trusted(told)
     assert not trusted(judged({"a": score(theta=50.0)}))
     assert not trusted(judged(estimates={"J_p": firm(status="poorly determined")}))
 
 
 def test_all_numbers_can_be_used_and_none_was_asked() -> None:
-    told = judged(estimates={"J_p": firm(), "b_2": firm(), "m_p": firm(status="known")})[1]
-    assert (told.answer, told.advice) == ("yes", "")
+    estimates = {"J_p": firm(), "b_2": firm(), "m_p": firm(status="known")}
+    told = judged(TESTED, estimates)[1]
+    assert (told.answer, told.advice, told.reasons) == ("yes", "", ())
     assert told.headline == "All numbers can be used: J_p, b_2. Each is known to 5 % or better."
     nothing = judged(estimates={"m_p": firm(status="known"), "b_2": firm(status="left out")})[1]
     assert (nothing.answer, nothing.headline) == ("yes", "Nothing was estimated.")
+
+
+def test_numbers_that_no_run_was_held_out_to_test_can_be_used_in_part() -> None:
+    """What the model lacks is in them: only a run that was not fitted can tell."""
+    told = judged({"a": score(theta=100.0)}, {"J_p": firm(), "b_2": firm()})[1]
+    assert told.answer == "in part"
+    assert told.headline == "All numbers can be used: J_p, b_2. Each is known to 5 % or better."
+    assert told.reasons == (
+        "They rest on no run that was held out: a term that the model lacks would be in one of them, unnoticed.",
+    )
+
+
+def test_answers_that_explain_the_log_alike_are_told_before_the_numbers_that_differ() -> None:
+    two = "Two answers explain the log alike: k_12 46 or 38 N/m."
+    wide = firm(46.0, interval=(30.0, 60.0), status="poorly determined", unit="N/m")
+    told = judged(TESTED, {"J_p": firm(), "k_12": wide}, alike=two)[1]
+    assert (told.answer, told.reasons[0]) == ("in part", two)
+    assert told.headline.startswith("These numbers can be used: J_p.")
 
 
 WEAK = {"status": "poorly determined", "unit": "kg m^2"}
@@ -357,7 +380,7 @@ def test_numbers_bent_by_a_dead_time_are_not_used() -> None:
 def test_a_length_is_lumped_where_it_is_asked_and_the_inertia_is_known_to_be_none(
     values: dict[str, float], guesses: dict[str, float], lumped: bool
 ) -> None:
-    told = judged(estimates={"l_cg": firm()}, rig=rig(Pendulum, {"m_p": 0.2, **values}, guesses))[1]
+    told = judged(TESTED, {"l_cg": firm()}, rig=rig(Pendulum, {"m_p": 0.2, **values}, guesses))[1]
     assert any("equivalent point pendulum" in r for r in told.reasons) == lumped
     assert told.answer == ("in part" if lumped else "yes")
 

@@ -7,6 +7,9 @@ rescaled for residuals with a memory (the ratio of the robust to the white varia
 A term that ended at zero, or that the held-out data do not ask for, may still exist, and another has then taken its
 part: viscous friction is larger where Coulomb friction was left out. An interval that leaves this out is too short (the
 estimate after a choice of model is a mixture over models, Buckland, Burnham and Augustin 1997).
+
+Curvature and profiles are of one valley of the cost. Stiction and trips fold it into several, and of two whose costs
+differ by less than the ends of an interval allow the data prefer neither: numbers that differ are not well determined.
 """
 
 from __future__ import annotations
@@ -35,6 +38,9 @@ and the refits beside the estimate stall, as on the staircase that what sticks m
 
 AFFORDED = 2.0e7
 """Residuals that the profiles of one fit may cost altogether."""
+
+VAGUE = 10.0
+"""An interval of a positive number whose ends are this many times apart leaves it undetermined."""
 
 WIDE = 0.5
 """How far an interval may reach from a number that is well determined, relative to it."""
@@ -188,16 +194,21 @@ def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[f
 
 def _steps(best: Optimum, place: int, quantile: float) -> tuple[float, tuple[float, float]]:
     """Rise of the cost at the ends of an interval, and the steps down and up to them in the quadratic model."""
-    u = best.problem.unknowns[place]
-    ratio = np.diag(best.covariance)[best.white > 0] / best.white[best.white > 0]
-    here = float(best.covariance[place, place] / best.white[place]) if best.white[place] > 0 else 0.0
-    rise = quantile**2 * best.variance * max(1.0, here or float(np.median(ratio)) if ratio.size else 1.0)
+    u, rise = best.problem.unknowns[place], allowed_rise(best, place, quantile)
     model = best.problem.normal(best.x)
     curvature = _curvature(model.matrix, place, best)
     g = float(model.gradient[place]) if best.pinned[place] else 0.0
     # where the quadratic model has risen enough: 2 g s + c s^2 = rise
     down, up = ((-s + math.sqrt(s**2 + curvature * rise)) / curvature if curvature > 0 else u.scale for s in (-g, g))
     return rise, (down, up)
+
+
+def allowed_rise(best: Optimum, place: int, quantile: float | None = None) -> float:
+    """By how much the cost may rise towards the ends of an interval of so many standard errors, as in `estimate`."""
+    quantile = best.quantile if quantile is None else quantile
+    ratio = np.diag(best.covariance)[best.white > 0] / best.white[best.white > 0]
+    here = float(best.covariance[place, place] / best.white[place]) if best.white[place] > 0 else 0.0
+    return quantile**2 * best.variance * max(1.0, here or float(np.median(ratio)) if ratio.size else 1.0)
 
 
 def _curvature(A: Array, place: int, best: Optimum) -> float:
@@ -321,3 +332,64 @@ def widened(e: Estimate, interval: tuple[float, float]) -> Estimate:
     whole = replace(e, interval=(min(e.interval[0], interval[0]), max(e.interval[1], interval[1])))
     wide = e.status == "well determined" and whole.half > WIDE
     return replace(whole, status="poorly determined" if wide else e.status)
+
+
+DIFFERENT = 0.1
+"""Two answers differ in a number by more than this share of it."""
+
+COUNTS = {2: "Two", 3: "Three"}
+
+
+def with_valleys(
+    estimates: Mapping[str, Estimate], best: Optimum, log: SearchLog
+) -> tuple[dict[str, Estimate], str]:  # fmt: skip
+    """Estimates whose intervals hold what other valleys say, poorly determined where these differ; and the sentence.
+
+    It names those that are known to a factor of `VAGUE` at least, and is empty where none differs. Of what is known
+    poorly a difference below its standard error is none.
+    """
+    out, answers = dict(estimates), dict[str, list[float]]()
+    valleys = _apart(best, log)
+    for i in best.shared:
+        name = best.problem.unknowns[i].name
+        e = out.get(name)
+        if e is None or e.status not in ("well determined", "poorly determined"):
+            continue
+        values, rise = [e.value], allowed_rise(best, i)
+        least = e.stderr if e.status == "poorly determined" else 0.0
+        for higher, there in valleys:
+            v = float(there[i])
+            if higher <= rise and all(abs(v - w) > max(DIFFERENT * max(abs(v), abs(w)), least) for w in values):
+                values.append(v)
+        if len(values) > 1:
+            e = replace(widened(e, (min(values), max(values))), status="poorly determined")
+            out[name] = e
+            if e.interval[1] < VAGUE * e.interval[0]:
+                answers[name] = values
+    return out, _sentence(answers, out)
+
+
+def _apart(best: Optimum, log: SearchLog) -> list[tuple[float, Array]]:
+    """Valleys behind a ridge, the lowest first: by how much they are higher than the optimum, and values (n,) there.
+
+    A descent that was given up on its way back to the optimum has none before it.
+    """
+    problem, cost = best.problem, best.problem.cost(best.x)
+    most = cost + max((allowed_rise(best, i) for i in best.shared), default=0.0)
+    met = sorted(((c, k) for k, (of, c, _) in enumerate(log.valleys) if of is problem and c <= most))
+    places = [(c, log.valleys[k][2]) for c, k in met]
+    return [(c - cost, problem.value(x)) for c, x in places if problem.cost((best.x + x) / 2) > c]
+
+
+def _sentence(answers: Mapping[str, list[float]], estimates: Mapping[str, Estimate]) -> str:
+    if not answers:
+        return ""
+    most = max(map(len, answers.values()))
+    named = ", ".join(f"{n} {_either(v)} {estimates[n].unit}".removesuffix(" 1") for n, v in answers.items())
+    return f"{COUNTS.get(most, 'Several')} answers explain the log alike: {named}."
+
+
+def _either(values: list[float]) -> str:
+    """``38 or 46``, the chosen one first."""
+    shown = [f"{v:.2g}" for v in values[:4]]
+    return f"{', '.join(shown[:-1])} or {shown[-1]}"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from upright.basis import NOT_SUPPORTED, in_percent
 from upright.identification.inference.assumptions import resting
 from upright.identification.inference.ceiling import ENOUGH, Judged
+from upright.identification.inference.intervals import VAGUE
 from upright.identification.inference.loop import Standing
 from upright.identification.inference.ties import Tie
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
@@ -44,9 +45,6 @@ What is left over comes in waves, so that of one run fewer than promised lie ins
 that their models lack one signal in eleven had fewer than this (`python -m benchmarks bands`).
 """
 
-VAGUE = 10.0
-"""An interval of a positive number whose ends are this many times apart leaves it undetermined."""
-
 VANISHED = 1e-6
 """Share of its guess below which a mass has vanished: no guess of a rig's is a million times too large."""
 
@@ -75,7 +73,7 @@ class Evidence:
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
     more than they vary, `ties` which pairs of numbers cannot be separated, `missing` in sentences what the runs show
-    and the model lacks.
+    and the model lacks, `alike` in one which other answers explain them as well.
     """
 
     rig: GreyBox
@@ -96,12 +94,17 @@ class Evidence:
     nothing: bool = False
     ties: Sequence[Tie] = ()
     missing: Sequence[str] = ()
+    alike: str = ""
 
 
 def judge(evidence: Evidence) -> tuple[Judgement, ...]:
     """The three answers."""
     predicts = _predicts(evidence)
-    others = _usable(evidence, confirmed=predicts.answer == "yes"), _loop(evidence, supported=predicts.answer != "no")
+    untested = predicts.answer == "not tested"
+    others = (
+        _usable(evidence, confirmed=predicts.answer == "yes", untested=untested),
+        _loop(evidence, supported=predicts.answer != "no"),
+    )
     if evidence.interrupted:
         return predicts, *map(_not_evaluated, others)
     if predicts.answer != "no":
@@ -263,7 +266,7 @@ def _failure(lost: Sequence[str]) -> str:
     )
 
 
-def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
+def _usable(evidence: Evidence, *, confirmed: bool, untested: bool) -> Judgement:
     if evidence.lost:
         return Judgement(
             question=USABLE, answer="no",
@@ -271,7 +274,7 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
         )  # fmt: skip
     estimated = {n: e for n, e in evidence.estimates.items() if e.status not in IDLE}
     sure = [n for n, e in estimated.items() if e.status.startswith(DETERMINED)]
-    reasons: list[str] = list(evidence.unseen)
+    reasons: list[str] = [*evidence.unseen, *filter(None, [evidence.alike])]
     no = bool(evidence.unseen)
     if estimated and evidence.nothing:
         no = True
@@ -353,6 +356,11 @@ def _usable(evidence: Evidence, *, confirmed: bool) -> Judgement:
                 headline = "No number alone, only sums."
     else:
         answer, headline = "yes", f"All numbers can be used: {known}" if sure else "Nothing was estimated."
+    if answer == "yes" and sure and untested:
+        answer = "in part"
+        reasons.append(
+            "They rest on no run that was held out: a term that the model lacks would be in one of them, unnoticed."
+        )
     advice = ""
     if any(e.status in ("poorly determined", "unseen") for e in estimated.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."

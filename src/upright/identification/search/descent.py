@@ -41,9 +41,10 @@ class SearchLog:
     """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
 
     `best` holds the problem last worked on and where in it the search stood, `lower` a problem, a lower cost of it met
-    since and where, `rivals` values of another model that the data do not refuse, `unresolved` lengths below the
-    rounding and `unreached` limits. `conventions` says which signs and zeros look wrong; evaluated only when a fit is
-    poor, since no search mends a reversed sign. `path` are the mean squared residual and the shared numbers after each
+    since and where, `valleys` the same of where else descents ended, `rivals` values of another model that the data do
+    not refuse, `unresolved` lengths below the rounding and `unreached` limits. `conventions` says which signs and zeros
+    look wrong; evaluated only when a fit is poor, since no search mends a reversed sign. `path` are the mean squared
+    residual and the shared numbers after each
     accepted step.
     """
 
@@ -51,6 +52,7 @@ class SearchLog:
     history: list[tuple[str, float, int]] = field(default_factory=list[tuple[str, float, int]])
     best: tuple[Problem, Array] | None = None
     lower: tuple[Problem, float, Array] | None = None
+    valleys: list[tuple[Problem, float, Array]] = field(default_factory=list[tuple[Problem, float, Array]])
     warnings: list[str] = field(default_factory=list[str])
     rivals: dict[str, float] = field(default_factory=dict[str, float])
     unresolved: tuple[str, ...] = ()
