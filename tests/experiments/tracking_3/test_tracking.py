@@ -17,7 +17,15 @@ from upright.experiments.tracking_3 import laws as pd
 from upright.experiments.tracking_3 import run as tracking
 from upright.experiments.tracking_3.laws import AT, EXTRA, closed_by, paper_sets, tracker, with_sum
 from upright.experiments.tracking_3.pulses import fitted, identify_shaft, pulses, rig_of_file, shaft_study
-from upright.experiments.tracking_3.run import RESERVE, attempt, choose_step, levels_of, run_tracking, track_on
+from upright.experiments.tracking_3.run import (
+    RESERVE,
+    attempt,
+    choose_step,
+    levels_of,
+    run_tracking,
+    stiffest_damped,
+    track_on,
+)
 from upright.experiments.weighing_1a.run import Known
 from upright.gains import place, prefilter
 from upright.gains.loop import swing
@@ -347,11 +355,28 @@ def test_of_laws_that_arrive_at_once_the_one_that_rests_soonest_is_taken(monkeyp
     assert law.k_pf == pytest.approx(100.0, rel=0.06)
 
 
+SETS = {}
+"""Sets of Table 2 that were placed before, by plant and arguments."""
+
+
+def placed(rig, *how):
+    """The same as `paper_sets`, once."""
+    key = (rig.plant, *map(str, how))
+    if key not in SETS:
+        SETS[key] = paper_sets(rig, *how)
+    return SETS[key]
+
+
+def some_damping(model, kp):
+    """A PD this stiff, its damping not searched."""
+    return pd.near_pd(model, "PD, as stiff", kp, 0.01 * kp)
+
+
 @pytest.fixture
 def tracked(monkeypatch, tmp_path):
     """An experiment whose runs are said beforehand: the trips that are predicted, and what was run on the stand."""
 
-    def track(stand=None, *, tripped=math.inf, saturated=False, stops=99, rig=None, **more):
+    def track(stand=None, *, tripped=math.inf, saturated=False, stops=99, rig=None, stiffest=some_damping, **more):
         rig, told, left = rig or make_rig("torsional"), [], [stops]
         step = SimpleNamespace(size=0.05, reason="as requested")
         expected = SimpleNamespace(tripped=tripped, effort=SimpleNamespace(saturated=saturated))
@@ -360,6 +385,8 @@ def tracked(monkeypatch, tmp_path):
             left[0] -= 1
             return left[0] < 0
 
+        monkeypatch.setattr(tracking, "paper_sets", placed)
+        monkeypatch.setattr(tracking, "stiffest_damped", stiffest)
         monkeypatch.setattr(tracking, "choose_step", lambda model, laws, size: step)
         monkeypatch.setattr(tracking, "attempt", lambda model, law, size: expected)
         monkeypatch.setattr(tracking, "figured", lambda trial, size: trial)
@@ -394,7 +421,7 @@ def test_every_law_is_tried_and_told_by_its_run(tracked):
     """Four sets, the strongest with a sum, a PD, one as stiff as the strongest, and one on the far encoder."""
     rig = make_rig("torsional")
     stand = Held(rig, True, MAKES["torsional"])
-    done, expected = tracked(stand)
+    done, expected = tracked(stand, stiffest=stiffest_damped)
     assert [stem for stem, *_ in stand.held] == [
         *(f"tracking_set_{i}" for i in range(1, 5)), "tracking_with_a_sum", "tracking_PD", "tracking_PD_as_stiff",
         "tracking_PD_far_encoder",
@@ -405,9 +432,12 @@ def test_every_law_is_tried_and_told_by_its_run(tracked):
     (_, seconds, reference, pushes), *_ = stand.held
     np.testing.assert_array_equal(np.column_stack([reference, pushes]), np.column_stack(levels_of(rig, 0.05)))
     assert seconds == pytest.approx((reference.size - 1) * rig.period)
-    strongest = max(paper_sets(rig), key=lambda law: law.k_pf)
+    strongest = max(placed(rig), key=lambda law: law.k_pf)
     np.testing.assert_allclose(done.summed.law.requested, [*strongest.requested, EXTRA])
     assert done.stiff.law.k_pf == strongest.k_pf
+    for off in (0.5, 2.0):  # neither less nor more damping decays faster
+        other = pd.near_pd(rig, "PD", strongest.k_pf, off * float(done.stiff.law.K[1]))
+        assert other.decay < done.stiff.law.decay
     assert (done.far.law.K[2], done.far.law.K[3]) == (2.0, 0.1)
     assert done.search == (0.05, RESERVE * rig.limit)
     own = tracked(None, which=(1,), poles=np.array([-5.0, -6.0, -7.0, -8.0]))[0]
@@ -443,7 +473,7 @@ def test_poles_for_a_shaft_of_one_s_own_are_as_much_faster_as_it_swings(tracked,
     ratio = np.abs(rig.plant.linear(AT).poles().imag).max() / np.abs(nominal.linear(AT).poles().imag).max()
     assert ratio == pytest.approx(faster, rel=0.02)
     done, _ = tracked(Held(rig, True), rig=rig, stops=0)
-    for outcome, printed in zip(done.sets, paper_sets(rig), strict=True):
+    for outcome, printed in zip(done.sets, placed(rig), strict=True):
         np.testing.assert_allclose(outcome.law.requested, ratio * printed.requested)
 
 
