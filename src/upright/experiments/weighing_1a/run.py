@@ -60,7 +60,7 @@ class LoadedRig:
         return self.rig.plant.parameters()["k_1"]
 
 
-def drawn_twin(seed: int = 0, kind: str = "rectilinear") -> LoadedRig:
+def drawn_twin(seed: int, kind: str) -> LoadedRig:
     """A twin of a kind; inertias and springs differ by some percent, friction by a fifth, pieces by their tolerance.
 
     Seed 0 is the rig as designed.
