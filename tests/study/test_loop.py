@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from tests.closed_loop.programs import Pid, T, closed_loop
 from upright.errors import BadInput
 from upright.identification import Run
 from upright.study import load_study
+from upright.study.loop import matching
 
 STUDY = """
 [rig]
@@ -107,12 +110,47 @@ def test_a_law_faster_than_the_rows_needs_its_period(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("ratio", "every"), [(1.0, 1), (0.985, 1), (1.015, 1), (4.91, 5), (5.09, 5), (0.97, 0), (1.03, 0), (5.11, 0),
+                         (0.4, 0)],
+)  # fmt: skip
+def test_a_law_is_evaluated_a_whole_number_of_times_a_row_to_two_percent(ratio: float, every: int) -> None:
+    section: Any = SimpleNamespace(error=lambda key, text: BadInput(f"{key}: {text}"))
+    if every:
+        assert matching(section, ratio) == every
+    else:
+        with pytest.raises(BadInput, match=f"period: the law is evaluated {ratio:g} times per row"):
+            matching(section, ratio)
+
+
+@pytest.mark.parametrize(
+    ("reference", "metres"), [('"1 cm"', 0.01), ('"+1 cm"', 0.01), ('"-2 mm"', -2e-3), ('".5 cm"', 5e-3), ("0.3", 0.3)]
+)
+def test_a_reference_that_begins_like_a_number_is_one_and_another_is_a_column(
+    tmp_path: Path, reference: str, metres: float
+) -> None:
+    run = run_of(tmp_path, f'loop = {{ kind = "pid", kp = "2 V/m", reference = {reference} }}')
+    u, _ = run.loop.follow(np.zeros((3, 1)), ("x_1",))
+    np.testing.assert_allclose(u, 2 * metres)
+
+
+def test_a_law_has_the_limit_the_windup_and_the_delay_of_its_program(tmp_path: Path) -> None:
+    law = run_of(tmp_path, WRITTEN).loop.law
+    assert (law.limit, law.windup, law.delay) == (np.inf, "free", 0.0)
+    more = 'kind = "pid", limit = "1.5 V", windup = "hold", delay = 2, quantized = true'
+    loop = run_of(tmp_path, WRITTEN.replace('kind = "pid"', more).replace(', units = "log"', "")).loop
+    assert (loop.law.limit, loop.law.windup, loop.law.delay, loop.quantized) == (1.5, "hold", 2.0, True)
+
+
+@pytest.mark.parametrize(
     ("loop", "sentence"),
     [
         ('loop = { kind = "pip" }', "did you mean 'pid'"),
         ('loop = { kind = "pid", reference = "r" }', "needs kp, ki or kd"),
         ('loop = { kind = "pid", kp = 1, on = "y" }', 'on must be "error" or "measurement"'),
-        ('loop = { kind = "pid", kp = 1, taps = [1, 1] }', "two numbers that sum to 1"),
+        *(
+            (f'loop = {{ kind = "pid", kp = 1, taps = {taps} }}', "two numbers that sum to 1")
+            for taps in ("[1, 1]", "[1]", "[0.2, 0.3, 0.5]", '["0.2", 0.8]', "[true, 0]", "[2e6, -1999999]", "1")
+        ),
         ('loop = { kind = "pid", kp = 1, period = "3 ms" }', "whole number of times"),
         ('loop = { kind = "pid", kp = [1, 2] }', "2 values for 1 measured"),
         ('loop = { kind = "pid", kp = 1, units = "counts" }', 'units must be "SI" or "log"'),
