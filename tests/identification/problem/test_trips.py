@@ -5,16 +5,24 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from upright.identification import GreyBox, Parameter, Run
 from upright.identification.estimate import identify, predict
-from upright.identification.problem.trips import find_trips, with_trip_guesses
+from upright.identification.problem.trips import (
+    find_trips,
+    silenced,
+    trip_sentence,
+    unasked_trips,
+    with_trip_guesses,
+)
 from upright.physics import Furuta
 from upright.physics.oscillators import Torsional2
-from upright.signals.trips import find_trip
+from upright.signals.trips import Trip, find_trip
 from upright.simulation import simulate
 
 COUNT = 2 * np.pi / 16000
@@ -175,6 +183,58 @@ def test_a_prediction_finds_its_own_trip_and_says_so(tripped):
     told = predict(fit, fit.model, [run])["other"]
     assert told.adapted == ("initial", "input_end")
     assert min(told.fit_percent.values()) > 99
+
+
+LATE_CLOCK = Run(
+    label="push", role="fit", t=5.0 + 0.1 * np.arange(40), y=np.zeros((40, 1)), measured=("theta_1",),
+    u=np.where(np.arange(40) < 30, 2.0, 0.0)[:, None], unknown=("initial",),
+)  # fmt: skip
+"""A record that begins at 5 s, volts in the first 3 s of it."""
+BEGUN = Trip(at=0.5, error=0.01, logged=0.0, before=3.0, after=0.1, late=True, unexplained=0.1, otherwise=0.5)
+ENDED = replace(BEGUN, at=1.3, logged=3.0, before=4.0, after=0.2, late=False)
+
+
+def known(*trips: Trip, plain: bool = False) -> Any:
+    return SimpleNamespace(of=lambda run: ([*trips], plain))
+
+
+def test_a_command_is_silent_before_a_drive_came_on_and_from_where_it_went_off():
+    acting = silenced(LATE_CLOCK, [replace(BEGUN, at=0.46), replace(ENDED, at=1.26)]).u[:, 0]
+    since = np.arange(40) * 0.1
+    np.testing.assert_array_equal(acting, np.where((since > 0.46) & (since < 1.26), 2.0, 0.0))
+    np.testing.assert_array_equal(silenced(LATE_CLOCK, []).u, LATE_CLOCK.u)
+
+
+def test_a_trip_is_told_on_the_clock_of_the_log_with_what_to_declare():
+    assert trip_sentence(LATE_CLOCK, ENDED) == (
+        "In run 'push' the drive seems to have gone off at 6.3 s although the command is logged until 8 s "
+        '(acceleration 4 before, 0.2 after): declare unknown = ["initial", "input_end"].'
+    )
+    assert "have come on only at 5.5 s although the command is logged from 5 s" in trip_sentence(LATE_CLOCK, BEGUN)
+    assert trip_sentence(LATE_CLOCK, BEGUN).endswith('declare unknown = ["initial", "input_start"].')
+
+
+def test_a_trip_is_told_unless_its_moment_is_estimated():
+    said = unasked_trips(asked(), [LATE_CLOCK], known(BEGUN, ENDED))
+    assert said == [trip_sentence(LATE_CLOCK, trip) for trip in (BEGUN, ENDED)]
+    own = replace(LATE_CLOCK, unknown=("input_end",))
+    assert unasked_trips(asked(), [own], known(BEGUN, ENDED)) == [trip_sentence(own, BEGUN)]
+    for name in ("actuator.start", "actuator.end"):
+        everywhere = Parameter(name=name, value=1.0, estimate=True)
+        rig = GreyBox(plant=Torsional2, parameters={**asked().parameters, name: everywhere})
+        assert unasked_trips(rig, [LATE_CLOCK], known(BEGUN, ENDED)) == []
+
+
+def test_moments_that_are_estimated_begin_where_the_motion_shows_them():
+    both = replace(LATE_CLOCK, unknown=("input_start", "input_end"))
+    assert with_trip_guesses(asked(), both, known(BEGUN, ENDED)).guesses == {"input_start": 0.5, "input_end": 1.3}
+    # a guess that somebody gave stays, and of what is not estimated there is none
+    given = replace(both, guesses={"input_end": 2.0})
+    assert with_trip_guesses(asked(), given, known(BEGUN, ENDED)).guesses == {"input_start": 0.5, "input_end": 2.0}
+    assert with_trip_guesses(asked(), LATE_CLOCK, known(BEGUN, ENDED)) is LATE_CLOCK
+    # where the motion plainly follows the command, the last sample at which it acts
+    plain = with_trip_guesses(asked(), both, known(plain=True)).guesses
+    assert plain == {"input_end": pytest.approx(2.9)}
 
 
 @pytest.mark.real_data
