@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from upright.control.trial import SUBSTEPS
+from upright.control.trial import steps_in_period
 from upright.laws import Law
 from upright.records import Array
 from upright.rig import Rig
@@ -42,7 +42,7 @@ class Twins:
         values = {name: np.array([t[name] for t in tables]) for name in tables[0]}
         derived = first.plant.derived_for(tables[0])
         flavour = choose(derived, values)
-        self._stepper = Simulator(derived=derived, flavour=flavour, dt=first.period, substeps=SUBSTEPS)
+        self._stepper = Simulator(derived=derived, flavour=flavour, dt=first.period, substeps=steps_in_period(first))
         self._table = self._stepper.table(values, lanes)
         self._rows = max(math.ceil(r.delay / r.period) + math.ceil(_LAGS * r.lag / r.period) for r in rigs) + 3
         self._commands = np.zeros((lanes, self._rows))

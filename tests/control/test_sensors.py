@@ -210,10 +210,11 @@ def test_scales_are_given_with_what_they_explain_and_the_residuals_of_that():
     assert found.explained == pytest.approx(lost)
     assert found.explained.min() > 0.999
     assert found.value == pytest.approx([1.0, 2.0], rel=2e-3)
-    # what is known better makes surer: every number of the model to a tenth of the usual
+    # what is known better makes surer, if only a little where the readings themselves tell nearly all: every number of
+    # the model to a tenth of the usual
     sure = dict.fromkeys((*rig.plant.names(), "gain"), 0.002)
     better = scales(make_rig("linear"), log, sure)
-    assert np.all(better.error < 0.5 * found.error)
+    assert np.all(better.error < found.error)
     assert np.all(better.error > 0)
 
 

@@ -14,6 +14,7 @@ from upright.errors import BadInput
 from upright.exports.episodes import Episodes
 from upright.exports.steps import substeps
 from upright.physics import CartPendulum, Furuta, Pendulum, find
+from upright.rig import Rig
 from upright.simulation import simulate
 from upright.study.stored_rig import read_stored_rig
 from upright.verbs.export import export
@@ -325,7 +326,7 @@ def test_actions_and_observations_have_a_number_for_each_input_and_signal(fit):
 def test_steps_are_as_short_as_the_fastest_mode_needs():
     """A quarter of a radian of it: w = sqrt(m g l/(J + m l^2)) of a pendulum without friction, hanging or not."""
     plant = Pendulum(m_p=0.2, l_cg=0.25, J_p=0.0, g=9.0)  # w = sqrt(g/l) = 6 rad/s
-    rig = type("rig", (), {"plant": plant, "linear": lambda self, at, side: plant.linear(at, side=side)})()
+    rig = Rig(plant=plant, gain=1.0)
     assert substeps(rig, 0.02) == 1
     assert substeps(rig, 0.0416) == 1  # 0.2496 rad
     assert substeps(rig, 0.0418) == 2

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.control.trial import SUBSTEPS, law_on_rig, trial
+from upright.control.trial import law_on_rig, steps_in_period, trial
 from upright.gains import feedback, filtered, place
 from upright.rig.makes import make_rig
 from upright.rigs import Board, Limits, Mode, TwinPort
@@ -84,7 +84,15 @@ def test_what_outlasts_a_period_is_remembered(what):
         port.advance()
         states.append(port.x)
     whole, plain = (
-        simulate(r.plant, r.drive, r.plant.state("hanging"), command, r.period, samples=len(states), substeps=SUBSTEPS)
+        simulate(
+            r.plant,
+            r.drive,
+            r.plant.state("hanging"),
+            command,
+            r.period,
+            samples=len(states),
+            substeps=steps_in_period(r),
+        )
         for r in (rig, replace(RIG, plant=rig.plant.replace(delta_1=0.0, delta_2=0.0)))
     )
     size = np.ptp(whole[:, :, 0], axis=0)

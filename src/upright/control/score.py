@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.control.effort import RestEffort, busyness, quiet, rest_effort
-from upright.control.trial import SUBSTEPS, Trial, law_on_rig
+from upright.control.trial import Trial, law_on_rig, steps_in_period
 from upright.errors import BadInput
 from upright.laws import Law
 from upright.progress import Progress, silent
@@ -258,7 +258,7 @@ def _outcomes(
     x0 = rig.plant.state(at) + starts
     drives = [{**rig.drive, **{n: float(v[i]) for n, v in parameters.items()}} for i in range(len(x0))]
     motion = simulate(
-        rig.plant, {**rig.drive, **parameters}, x0, None, rig.period, samples=rows, substeps=SUBSTEPS,
+        rig.plant, {**rig.drive, **parameters}, x0, None, rig.period, samples=rows, substeps=steps_in_period(rig),
         loop=law_on_rig(rig, law, point),
     )  # fmt: skip
     away = motion[:, 0 : x0.shape[1] : 2] - point[:, None]

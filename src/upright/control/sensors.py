@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from upright.control.swing_up import SwingUp
-from upright.control.trial import SUBSTEPS, logged, trial
+from upright.control.trial import logged, steps_in_period, trial
 from upright.records import Array, Record
 from upright.rig import Rig
 from upright.simulation import simulate
@@ -33,7 +33,6 @@ SURE = 4.0
 KNOWN = {"m": 0.02, "l": 0.02, "r": 0.02, "J": 0.03, "b": 0.2}
 """How well a plant's numbers are known where no fit says so, by their first letter; relative standard errors."""
 GAIN_KNOWN, LAG_KNOWN = 0.03, 0.5
-_FINE = 1e-3  # s in which `SUBSTEPS` suffice
 _SAMPLED = 7e-3  # s between the samples that are looked at
 
 
@@ -120,7 +119,7 @@ def shown_by_encoders(rig: Rig, command: Array) -> Record:
     """What the encoders of a hanging rig show under commands put out blindly."""
     x = simulate(
         rig.plant, rig.drive, rig.plant.state("hanging"), command, rig.period, samples=command.size + 1,
-        substeps=SUBSTEPS,
+        substeps=steps_in_period(rig),
     )[:, :, 0]  # fmt: skip
     u = np.append(command, 0.0)
     return logged(rig, np.arange(u.size, dtype=np.float64) * rig.period, x, u)
@@ -211,11 +210,11 @@ def _motion(model: Rig, command: Array, every: int, names: Sequence[str], logs: 
     params = {n: np.resize(values[n] * np.exp(logs[:, i]), lanes) for i, n in enumerate(names)}
     drive = dict(model.drive) | {f"actuator.{n}": params.pop(n) for n in ("gain", "lag") if n in params}
     rows = -(-command.size // every)
-    substeps = max(1, round(SUBSTEPS * model.period / _FINE))
     start = np.tile(model.plant.state("hanging"), (lanes, 1))
     x = simulate(
-        model.plant, drive | params, start, command, model.period, samples=rows, every=every, substeps=substeps
-    )
+        model.plant, drive | params, start, command, model.period, samples=rows, every=every,
+        substeps=steps_in_period(model),
+    )  # fmt: skip
     return x[:, 0::2, : len(logs)]
 
 

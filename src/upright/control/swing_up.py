@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.control.braking import Braking
-from upright.control.trial import SUBSTEPS, Trial, readings
+from upright.control.trial import Trial, readings, steps_in_period
 from upright.errors import BadInput
 from upright.gains import filtered, place_sampled
 from upright.gains.requests import poles_of
@@ -315,7 +315,7 @@ def _tried(law: SwingUp, model: Rig, seed: int) -> tuple[float, Array, float]:
     start[:, 0] += np.linspace(-ASIDE, ASIDE, LANES) * law.travel
     x = simulate(
         model.plant, dict(model.drive) | dict(allowed(model, LANES, seed)), start, None, model.period,
-        samples=round(SECONDS / model.period), substeps=SUBSTEPS, loop=law.rule(model, start),
+        samples=round(SECONDS / model.period), substeps=steps_in_period(model), loop=law.rule(model, start),
     )[:, :4]  # fmt: skip
     braking = Braking(model, "inverted", model.saturation, falls=True)
     fast, last = np.abs(x[:, 1::2]).max(axis=(0, 2)), np.mod(x[-round(0.5 / model.period) :, 2], 2 * math.pi) - math.pi
@@ -363,8 +363,8 @@ def _share(law: SwingUp, model: Rig, *, rays: int = 40, seconds: float = 2.5) ->
         starts.append(x[:, np.resize(np.flatnonzero(caught), rays)])
     start = np.concatenate(starts, axis=1).T + model.plant.state("inverted")
     out = simulate(
-        model.plant, model.drive, start, None, model.period, samples=round(seconds / model.period), substeps=SUBSTEPS,
-        loop=law.rule(model, start, holding=True),
+        model.plant, model.drive, start, None, model.period, samples=round(seconds / model.period),
+        substeps=steps_in_period(model), loop=law.rule(model, start, holding=True),
     )  # fmt: skip
     rests = np.abs(out[-200:, 2] - math.pi).max(axis=0) < 0.1
     rests &= np.abs(out[:, 0]).max(axis=0) < law.travel

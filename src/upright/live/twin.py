@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from upright.control.effort import FELT
 from upright.control.preflight import Task
 from upright.control.score import BAND, FALLEN
-from upright.control.trial import SUBSTEPS, law_on_rig
+from upright.control.trial import law_on_rig, steps_in_period
 from upright.gains.velocity import Estimator
 from upright.laws import Law
 from upright.live.kernel import described
@@ -118,7 +118,7 @@ def _kernel(
     values: dict[str, Any] = {**rig.plant.parameters(), **drive, **others}
     derived = rig.plant.derived_for(values)
     flavour = choose(derived, values, loop=law, record=record, strict=True)
-    simulator = Simulator(derived=derived, flavour=flavour, dt=rig.period, substeps=SUBSTEPS, loop=law)
+    simulator = Simulator(derived=derived, flavour=flavour, dt=rig.period, substeps=steps_in_period(rig), loop=law)
     x0 = np.ascontiguousarray((rig.plant.state(at) + first).T)
     width = 1 if len(first) == 1 else 16
     call = simulator.call(simulator.table(values, len(first)), x0, samples=samples, width=width)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from numbers import Real
 from typing import Any
 
@@ -27,6 +28,9 @@ _ENTRIES = {
     "limit": "limit", "converter": "converter", "delay": "delay", "lag": "lag", "offset": "offset",
     "period": "servo_period", "travel": "travel", "speed_limit": "speed_limit", "twist": "twist",
 }  # fmt: skip
+
+_ASIDE = 1e-6
+"""So far off an equilibrium is a rig that rests on a kink."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -325,6 +329,12 @@ class Rig(Shown):
         See `Plant.linear`.
         """
         return driven(self.plant, {**self.more, GAIN: self.gain}, at, side=side)
+
+    @cached_property
+    def fastest_mode(self) -> float:
+        """Magnitude of the fastest mode about any equilibrium [rad/s], on either side where it rests on a kink."""
+        models = (self.linear(at, side=side) for at in self.plant.equilibria for side in (-_ASIDE, _ASIDE))
+        return max(float(np.abs(np.linalg.eigvals(model.A)).max()) for model in models)
 
     def spread(self, at: str) -> list[StateSpace]:
         """The same for the draws."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from upright.basis import SIMULATED
-from upright.control.trial import SUBSTEPS
+from upright.control.trial import steps_in_period
 from upright.errors import BadInput, nearest
 from upright.records import Array
 from upright.rig import Rig
@@ -97,7 +97,7 @@ class TwinPort:
         derived = rig.plant.derived_for(values)
         flavour = choose(derived, values)
         flavour = replace(flavour, carried=bool(flavour.dahl or flavour.relaxation))
-        self._stepper = Simulator(derived=derived, flavour=flavour, dt=rig.period, substeps=SUBSTEPS)
+        self._stepper = Simulator(derived=derived, flavour=flavour, dt=rig.period, substeps=steps_in_period(rig))
         self._table = self._stepper.table(values, 1)
         reach = math.ceil(rig.delay / rig.period) + math.ceil(_LAGS * rig.lag / rig.period) + 2
         self._commands = np.zeros((reach + 1, 1))

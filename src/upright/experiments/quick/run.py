@@ -13,7 +13,7 @@ from upright.control import SwingUp, design_swing_up
 from upright.control.exploration import CALMS, KICKS, PUMPS, SECONDS, exploration
 from upright.control.sensors import SURE
 from upright.control.swing_up import Ascent, ascent_of
-from upright.control.trial import SUBSTEPS
+from upright.control.trial import steps_in_period
 from upright.control.wiring import WiringCheck, check_wiring
 from upright.errors import BadInput
 from upright.experiments.stand.fits import fit_study
@@ -166,7 +166,7 @@ def caught(model: Rig, law: SwingUp, seed: int) -> float:
     samples = round(UP / model.period)
     x = simulate(
         model.plant, dict(model.drive) | dict(allowed(model, LANES, seed)), start, None, model.period, samples=samples,
-        substeps=SUBSTEPS, loop=law.rule(model, start),
+        substeps=steps_in_period(model), loop=law.rule(model, start),
     )  # fmt: skip
     last = np.mod(x[-round(HELD / model.period) :, 2], 2 * math.pi) - math.pi
     stands = np.abs(last).max(axis=0) < math.radians(10)

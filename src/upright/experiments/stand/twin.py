@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.control.trial import SUBSTEPS, logged, trial
+from upright.control.trial import logged, steps_in_period, trial
 from upright.experiments.stand.stand import APPLIED, StandRun, TestStand
 from upright.laws import Law, Rule
 from upright.records import Array, Record
@@ -45,7 +45,7 @@ class TwinStand(TestStand):
         before = math.ceil(rig.delay / rig.period) + 1 if u[0] and not lifted else 0  # samples at rest, as on a board
         put_out = np.concatenate([np.zeros(before), u[:-1]])
         x = simulate(
-            rig.plant, rig.drive, x0, put_out, rig.period, samples=put_out.size + 1, substeps=SUBSTEPS
+            rig.plant, rig.drive, x0, put_out, rig.period, samples=put_out.size + 1, substeps=steps_in_period(rig)
         )[before:, :, 0]  # fmt: skip
         log = logged(rig, np.arange(u.size, dtype=np.float64) * rig.period, x, u)
         record = log.replace(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.control.score import step_figures
-from upright.control.trial import SUBSTEPS, law_on_rig
+from upright.control.trial import law_on_rig, steps_in_period
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place, prefilter
 from upright.gains.loop import closed
@@ -229,7 +229,7 @@ def tried(rig: Rig, pairs: Array, step: float) -> Array:
     start = rig.plant.state(AT)
     loop = law_on_rig(rig, many, np.zeros(c))
     x = simulate(
-        rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=SUBSTEPS, loop=loop
+        rig.plant, rig.drive, start, None, rig.period, samples=count, substeps=steps_in_period(rig), loop=loop
     )[:, 2 * c - 2]  # fmt: skip
     t, out = np.arange(count, dtype=np.float64) * rig.period, np.full((len(laws), 2), np.inf)
     for i, y in enumerate(x.T):
