@@ -104,3 +104,15 @@ def test_points_drowned_in_noise_or_of_a_joint_that_sticks_are_left_out_and_told
     good, notes = usable(data, dry=False)
     assert good.tolist() == [True, False, True, False]
     assert notes == ("Left out at 2, 4 rad/s: it is mostly noise.",)
+
+
+def test_a_response_is_told_in_decibels_with_the_relative_error_of_its_size():
+    """Half of the mean square of a complex error is along the response, and its size errs by that."""
+    data = FrequencyResponse(
+        omega=np.array([1.0, 2.0]), response=np.array([[10.0], [-0.1j]]), outputs=("theta",),
+        variance=np.array([[0.02], [2e-6]]),
+    )  # fmt: skip
+    assert data.magnitude_dB == pytest.approx(np.array([[20.0], [-20.0]]))
+    assert data.error == pytest.approx(np.array([[0.01], [0.01]]))
+    assert len(data.only([1])) == 1
+    assert data.only(data.omega > 1.5).error.tolist() == data.error[1:].tolist()
