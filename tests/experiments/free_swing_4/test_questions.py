@@ -208,3 +208,21 @@ def test_what_was_fitted_before_somebody_stopped_it_is_kept(swung):
         assert done.interrupted
         assert len(done.answers) == kept
         assert (done.drifts, done.balance) == ((), None)
+
+
+def test_a_question_is_fitted_by_its_own_method_under_its_own_title(tmp_path, monkeypatch):
+    asked, told = [], []
+
+    def fitted(model, runs, *, method, progress):
+        asked.append((model, [run.role for run in runs], method))
+        progress("searching", 0.25)
+        progress("done", 1.0)
+        return "fit"
+
+    monkeypatch.setattr("upright.identification.estimate.identify", fitted)
+    pair = write_questions(CART, tmp_path)[1]
+    answer = free_swing.fit_question(*pair, lambda step, share: told.append((step, share)))
+    assert (answer.question, answer.fit, answer.study.path) == (pair[0], "fit", pair[1])
+    assert asked == [(answer.study.model, ["fit", "predict"], "auto")]
+    assert [share for _, share in told] == [0.25, 1.0]
+    assert all(pair[0].title in step for step, _ in told)

@@ -6,6 +6,8 @@ import json
 import math
 import re
 import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,9 +18,10 @@ from tests.exports.rigs import fit_file
 from tests.running.test_accepted import SERIAL, STUDY
 from upright.basis import NOT_TRUSTED, Basis
 from upright.control.swing_up import MODE
-from upright.errors import BadInput
+from upright.errors import BadInput, RigStopped
 from upright.experiments.laboratory import chosen_experiments
 from upright.experiments.regulation_2.run import scored
+from upright.experiments.stand import live
 from upright.experiments.stand.live import live_stand, run_of
 from upright.experiments.stand.studies import write_study
 from upright.experiments.swing_up_2b.run import run_swing_up
@@ -221,3 +224,37 @@ def test_a_law_from_a_fit_that_is_not_trusted_is_not_armed_on_hardware_without_a
     said = "port /dev/no_such_board" if accept else "not armed on hardware.*explained to 41 %"
     with pytest.raises(BadInput, match=said):
         live.hold(law, "inverted", tmp_path, "held", 1.0, start=np.zeros(4))
+
+
+def test_a_signal_or_an_exploration_is_compared_with_no_model_and_watched_by_none(own, tmp_path, monkeypatch):
+    """A signal lasts as many periods as it has samples; hands lift and bolt on before it."""
+    asked: list[RunRequest] = []
+    monkeypatch.setattr(type(own), "_logged", lambda _self, request, _folder: asked.append(request))
+    own.run([0.0, 1.0, 2.0], tmp_path, "steps", lifted=0.5, bolted=0.25)
+    own.explore("rule", 9.0, tmp_path, "explore")
+    signal, found = asked
+    assert (signal.samples, signal.seconds) == ((0.0, 1.0, 2.0), pytest.approx(3 * 0.002))
+    assert (signal.tilt, signal.bolted, signal.stem) == (0.5, 0.25, "steps")
+    assert (found.exploration, found.seconds, found.stem, found.tilt) == ("rule", 9.0, "explore", 0.0)
+    for request in asked:
+        assert (request.check, request.watch, request.rig) == (False, False, own.file.path)
+
+
+@pytest.mark.parametrize(("zero", "at", "away"), [("hanging", "inverted", math.pi), ("inverted", "hanging", -math.pi)])
+def test_what_goes_from_where_it_rests_counts_from_where_its_encoders_were_zeroed(
+    own, tmp_path, monkeypatch, zero, at, away
+):
+    """Half a turn to the other equilibrium; no law that it is let go under has such an origin."""
+    told: list[object] = []
+    result = SimpleNamespace(log=[1, 2, 3], end=SimpleNamespace(stopped=""))
+    monkeypatch.setattr(type(own), "_run", lambda *_: result)
+    monkeypatch.setattr(live, "run_of", lambda result, at, origin: told.append((at, origin)))
+    law = Law(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[0.0, -1.0]])
+    stand = replace(own, zero=zero)
+    stand.hold(law, at, tmp_path, "held", 3.0)
+    stand.hold(law, at, tmp_path, "held", 3.0, start=np.array([0.0, 0.0, 0.1, 0.0]))
+    stand.hold(law, zero, tmp_path, "held", 3.0)
+    assert told == [(at, [0.0, pytest.approx(away)]), (at, None), (zero, None)]
+    result.log = [1, 2]
+    with pytest.raises(RigStopped):
+        stand.hold(law, at, tmp_path, "held", 3.0)

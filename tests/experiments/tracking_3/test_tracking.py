@@ -540,3 +540,20 @@ def test_a_shaft_with_a_spring_to_ground_is_not_tracked():
             rig_of_file(rig.changed(**{spring: 1.0}), "fit.json")
     with pytest.raises(BadInput, match="two inertias on a shaft"):
         rig_of_file(make_rig("linear"), "fit.json")
+
+
+@pytest.mark.parametrize("k_pf", [3.0, 7.7, 11.3, 19.9, 41.0, 0.067])
+def test_a_step_has_two_digits_and_never_more_than_its_bound(monkeypatch, k_pf):
+    """By effort alone: 95 % of the limit over the gain, cut off after two digits."""
+    rig = make_rig("torsional")
+    monkeypatch.setattr(tracking, "attempt", lambda *_: SimpleNamespace(twist=1e-9, travel=1e-9))
+    laws = [SimpleNamespace(k_pf=k) for k in (0.5 * k_pf, -k_pf)]
+    chosen = choose_step(rig, laws)
+    most = 0.95 * rig.limit / k_pf
+    assert chosen.by_effort == pytest.approx(most)
+    assert chosen.size <= most
+    exponent = math.floor(math.log10(most)) - 1
+    assert chosen.size == pytest.approx(math.floor(most / 10.0**exponent) * 10.0**exponent)
+    assert chosen.reason == "bounded by effort"
+    asked = choose_step(rig, laws, 0.0123)
+    assert (asked.size, asked.reason) == (0.0123, "as requested")

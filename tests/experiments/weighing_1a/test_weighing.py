@@ -1,5 +1,9 @@
 """Does experiment 1a say what the rig of the later experiments weighs?"""
 
+import math
+from dataclasses import dataclass
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,6 +11,7 @@ from upright.errors import BadInput
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.twin import TwinStand
 from upright.experiments.weighing_1a import from_logs
+from upright.experiments.weighing_1a import run as weighing
 from upright.experiments.weighing_1a.chapter import chapter
 from upright.experiments.weighing_1a.from_logs import weigh_logs
 from upright.experiments.weighing_1a.run import Weighing, drawn_twin, first_body, measure_body, run_weighing
@@ -108,3 +113,30 @@ def test_a_twin_is_weighed_again_from_its_logs_where_a_folder_keeps_them(tmp_pat
 def test_twins_are_bodies_on_springs():
     with pytest.raises(BadInput, match=r"--rig is rectilinear or torsional, got 'furuta'"):
         from_logs.weigh_twin("furuta", 0, None)
+
+
+@dataclass
+class Number:
+    """A number and its standard error."""
+
+    value: float
+    stderr: float
+
+
+@pytest.mark.parametrize("make", MAKES)
+def test_what_is_handed_on_is_the_bare_body_and_what_is_mounted_on_it_later(make, tmp_path, monkeypatch):
+    """Errors of the line, of the pieces (each by its tolerance, so by their root) and of the rest add up in squares."""
+    m = MAKES[make]
+    line = SimpleNamespace(bare=Number(0.5, 0.01), k=Number(400.0, 2.0))
+    campaign = SimpleNamespace(loadings=line)
+    campaign.written = lambda folder: campaign
+    monkeypatch.setattr(weighing, "measure_body", lambda on, progress: campaign)
+    done = run_weighing(TwinStand(rig=make_rig(make, 3)), 3, tmp_path)
+    body, *spring = done.known
+    mounted = m.mounted
+    assert body.name == m.body
+    assert body.value == pytest.approx(0.5 + mounted.each * mounted.pieces + mounted.rest)
+    pieces = m.on_spring.tolerance * mounted.each * math.sqrt(mounted.pieces)
+    assert body.stderr**2 == pytest.approx(0.01**2 + pieces**2 + mounted.rest_error**2)
+    shaft = make in ("torsional", "rectilinear")
+    assert [(k.name, k.value, k.stderr) for k in spring] == [("k_12", 400.0, 2.0)] * shaft
