@@ -11,11 +11,13 @@ from scipy.signal import lti
 
 from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.sound import law_for
-from upright.control.gross import FACTORS, ROUNDING, WEIGHT_SHARE, WINDOW, GrossFaults
+from upright.control.gross import FACTORS, HARDEST, ROUNDING, WEIGHT_SHARE, WINDOW, GrossFaults
+from upright.control.gross import STRUCK as FADING
 from upright.control.watch import held_by
 from upright.control.witnesses import Witnesses
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
+from upright.rigs import Limits
 
 MAKES = ("furuta", "linear")
 BROKEN, STRUCK = 0.4, 0.45  # s after the pendulum was let go
@@ -170,3 +172,44 @@ def test_lanes_do_not_hear_of_one_another():
         gross.see(y[k], u[k])
         alone.see(y[k, 1:2], u[k, 1:2])
     assert np.allclose(gross.needed[:, 1], alone.needed[:, 0], rtol=1e-12)
+
+
+def test_the_stated_hand_and_its_blows_are_as_large_as_they_are_said_to_be():
+    """What its help says of the numbers: the lean that a push holds, a board's patience, a blow's low-pass and size."""
+    assert math.degrees(math.asin(WEIGHT_SHARE)) == pytest.approx(5.7, abs=0.05)
+    wide = (1.0, 1.0)
+    assert Limits(travel=wide, speed=wide, start=wide, command=1.0).watchdog == WINDOW
+    fading = FADING * math.exp(1 - FADING)  # t exp(-t) of two equal corners, over its largest at t = 1
+    assert fading == pytest.approx(0.4, abs=0.01)
+    struck = 1.5 / (12.9 * WINDOW)  # rad/s over what a hand of 12.9 rad/s^2 makes in the average's time
+    assert struck == pytest.approx(5.8, abs=0.05)
+    assert struck < HARDEST
+
+
+def seen(needed, left, since=1.0):
+    """Gross faults of a Furuta pendulum that need so many strengths of the hand: sound, then each kind."""
+    watch = watching("furuta")
+    kinds = [f"{name} {factor:g}" for name, factor in watch.kinds]
+    watch.needed[:, 0], watch._left[:, 0], watch._for[0] = 9.0, 9.0, since
+    for row, values in ((watch.needed, needed), (watch._left, left)):
+        row[0, 0] = values.pop("sound")
+        for name, value in values.items():
+            row[1 + kinds.index(name), 0] = value
+    says, which = watch.speaks()
+    return kinds[which[0]] if says[0] else ""
+
+
+@pytest.mark.parametrize(
+    ("needed", "left", "since", "says"),
+    [
+        ({"sound": 1.1, "theta -1": 0.2}, {"sound": 3.0, "theta -1": 1.4}, 1.0, "theta -1"),
+        ({"sound": 0.9, "theta -1": 0.1}, {"sound": 3.0, "theta -1": 1.4}, 1.0, ""),  # which a hand may do
+        ({"sound": 1.1, "theta -1": 0.23}, {"sound": 3.0, "theta -1": 1.4}, 1.0, ""),  # a fifth of that is 0.22
+        ({"sound": 1.1, "theta -1": 0.2}, {"sound": 3.0, "theta -1": 1.6}, 1.0, ""),  # explains less than half
+        ({"sound": 1.1, "theta -1": 0.2, "psi 2": 0.1}, {"sound": 3.0, "theta -1": 1.4, "psi 2": 1.2}, 1.0, "psi 2"),
+        ({"sound": 5.9, "theta -1": 0.2}, {"sound": 9.0, "theta -1": 1.4}, 0.0, ""),  # a blow that has just begun
+        ({"sound": 6.1, "theta -1": 0.2}, {"sound": 9.0, "theta -1": 1.4}, 0.0, "theta -1"),  # no blow is so hard
+    ],
+)
+def test_a_gross_fault_needs_a_fifth_of_what_no_hand_gives_and_explains_half(needed, left, since, says):
+    assert seen(dict(needed), dict(left), since) == says
