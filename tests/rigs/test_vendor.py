@@ -7,7 +7,9 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
+from upright.rig.makes import make_rig
 from upright.rigs import Capabilities, Mode
+from upright.rigs.driver import Connection
 from upright.rigs.vendor.nidaqmx import NidaqmxPort
 from upright.rigs.vendor.quanser import QuanserPort
 
@@ -135,3 +137,19 @@ def test_a_quanser_board_opens_at_zero_and_its_watchdog_runs_while_its_drive_is_
     port.close()
     port.close()
     assert card.calls == [("watchdog_reload",), zero, off, ("watchdog_stop",), ("close",)]
+
+
+def test_a_board_s_converter_is_of_ten_volts_and_sixteen_bits_where_its_file_does_not_say():
+    """And an encoder that counts the other way has counts below zero; the rest of [board] is the port's affair."""
+    rig = make_rig("furuta")
+    plain = Connection(kind="nidaqmx", model=rig, truth=rig, board={"device": "Dev1"})
+    about, rest = plain.capabilities()
+    assert (about.name, about.coordinates, about.counts) == ("nidaqmx", ("psi", "theta"), rig.per_unit)
+    assert (about.full_scale, about.steps, about.period) == (10.0, 2**15, rig.period)  # to either side
+    assert (about.command_unit, about.modes, rest) == ("V", frozenset({Mode.HOST}), {"device": "Dev1"})
+    turned = Connection(kind="quanser", name="bench 3", model=rig, truth=rig, board={"full_scale": 12, "steps": 2048.0},
+                        reversed=frozenset({"theta"}))  # fmt: skip
+    about, rest = turned.capabilities()
+    assert about.name == "bench 3"
+    assert about.counts == (rig.per_unit[0], -rig.per_unit[1])
+    assert (about.full_scale, about.steps, rest) == (12.0, 2048, {})
