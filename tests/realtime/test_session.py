@@ -162,6 +162,13 @@ def test_a_sample_that_comes_again_is_answered_but_not_logged_again(tmp_path):
     assert np.all(np.diff(ticks) == 1)
 
 
+def test_a_run_is_tested_zeroed_and_put_before_others_where_nobody_says_otherwise(tmp_path):
+    """As docs/howto/rigs.md tells what happens in a run, step by step."""
+    order = RunOrder(make=anywhere, law=as_values(LAW), seconds=1.0, log=tmp_path / "run.mcap")
+    assert (order.check, order.zero, order.fifo, order.mode) == (True, True, True, Mode.HOST)
+    assert (order.rig_text, order.references, order.accepted) == ("", (), "")
+
+
 def test_a_run_that_has_not_begun_has_done_nothing():
     assert RunState(phase="waiting") == RunState(
         phase="waiting", time=0.0, tick=0, late=0, mode=Mode.IDLE, faults=Fault(0), command=0.0, applied=0.0,

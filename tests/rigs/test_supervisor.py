@@ -13,7 +13,7 @@ from upright.errors import BadInput, RigStopped
 from upright.gains import feedback, filtered, place
 from upright.laws import Rule, state_feedback
 from upright.rig.makes import make_rig
-from upright.rigs import Board, Fault, Limits, Mode, TwinPort
+from upright.rigs import Board, Capabilities, Fault, Limits, Mode, TwinPort
 from upright.rigs.supervisor import PLAIN, PULSES, Duty, Supervisor
 from upright.simulation import simulate
 
@@ -378,3 +378,32 @@ def test_a_command_that_has_just_jumped_has_not_yet_moved_the_arm_that_friction_
         way, speed = way + speed * RIG.period, speed + MODEL.B[1, 0] * 5.0 * RIG.period
     # free of friction it had gone `UNSEEN` counts by then, and not much more: friction takes 0.5 % of 5 V
     assert way * RIG.per_unit[0] == pytest.approx(UNSEEN, rel=0.25)
+
+
+def test_what_nobody_says_of_a_duty_is_the_safe_side_of_it():
+    """docs/howto/rigs.md: encoders and drive are watched unless --no-watch, and nothing but the file's limits stops."""
+    duty = Duty(limits=None, model=RIG, at="inverted")
+    assert duty.watch
+    assert duty.watched
+    assert (duty.lean, duty.near) == (math.inf, math.inf)
+    assert not replace(duty, watch=False).watched
+    assert not replace(duty, model=None).watched
+    assert not replace(duty, at="hanging").watched
+    assert not replace(duty, model=make_rig("rectilinear").replace(counts=1000).replace(name="x"), at="rest").watched
+    plain = Limits(travel=(1.0,), speed=(1.0,), start=(1.0,), command=1.0)
+    assert (plain.frozen, plain.twist) == (0.0, math.inf)
+    about = Capabilities(name="bench", coordinates=("x",), counts=(1.0,), command_unit="V", full_scale=10.0, steps=10,
+                         period=1e-3)  # fmt: skip
+    # something can move, by the clock on the wall, and only a host can hold it
+    assert (about.hardware, about.virtual, about.paced, about.replayed) == (True, False, False, False)
+    assert about.modes == frozenset({Mode.HOST})
+
+
+def test_a_loop_that_was_aimed_and_not_started_commands_nothing():
+    scene = Scene()
+    scene.beside.prepare()
+    scene.port.hold("inverted", [0.0, 0.0, 0.05, 0.0])
+    scene.beside.aim(LAW)
+    with pytest.raises(BadInput, match="the loop was not started; call start first"):
+        scene.beside.step(scene.rig.exchange(0.0))
+    assert not scene.port._enabled
