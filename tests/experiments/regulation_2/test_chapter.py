@@ -171,3 +171,13 @@ def test_a_cart_that_rests_within_two_counts_of_its_own_encoder_is_still(ran, co
     measured = [row[-1] for row in table.rows[1::2]]
     assert len(measured) == 2
     assert all((cell == "still") == still for cell in measured)
+
+
+@pytest.mark.parametrize(("rms", "said"), [(0.3, True), (0.01, False)])
+def test_the_command_at_rest_is_blamed_only_where_it_is_too_much_itself(ran, rms, said):
+    """Most rigs that the fit allows may be busy where the one that was identified is quiet."""
+    rest = replace(ran.attempts[0].before.rest, rms=rms, peak=2 * rms)
+    busy = {"words": words(stabilised_with_excessive_effort=1.0), "rest": rest}
+    page = chapter(changed(nothing_run(ran), before=busy))
+    assert rest.quiet != said
+    assert ("The command at rest" in page.verdict + page.detail + shown(page)) == said
