@@ -13,6 +13,7 @@ import pytest
 
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b import run as frequency_run
+from upright.experiments.frequency_1b import sweeps
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_charts
 from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
@@ -491,3 +492,24 @@ def test_a_sine_that_settles_too_late_is_measured_over_its_last_periods_and_said
         assert dwell.record.t[0] == pytest.approx(dwell.settle)
     else:
         assert dwell.record.t[-1] == pytest.approx((n.size - 1) * tick)
+
+
+def test_a_sweep_is_as_strong_at_each_moment_as_its_frequency_of_that_moment_asks(monkeypatch):
+    """Peaks over what the most mobile coordinate stands at low (high/low)^(t/T): one height, but for the converter."""
+    make = MAKES["torsional"]
+    rig = make_rig("torsional", 2).replace(converter=0.0)
+    tick, (low, high) = rig.period * EVERY, make.band
+    still = np.zeros((1, 2)) + np.array(make.reach)
+    monkeypatch.setattr(sweeps, "_moved", lambda _rig, u: still * np.sin(np.arange(u.size))[:, None])
+    monkeypatch.setattr(sweeps, "response_of", lambda records, **_: "response")
+    u = broadband(rig, make, "sweep").log["u"]
+    one = u[: u.size // 6]
+    design = make_rig("torsional")
+    w = low * (high / low) ** (np.arange(one.size) / one.size)
+    motion = np.abs(design.linear("rest").response(w)[:, :, 0])
+    asked = np.minimum(make.rig.limit, np.min(np.array(make.reach) / motion, axis=1))
+    shape = one / asked
+    parts = [np.abs(part).max() for part in np.array_split(shape, 8)]
+    assert max(parts) / min(parts) < 1.1
+    np.testing.assert_allclose(u[one.size : 2 * one.size], one[::-1])  # and back
+    assert u.size * tick > 6 * 2 * np.pi / low
