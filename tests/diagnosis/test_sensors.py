@@ -94,6 +94,23 @@ def test_a_row_written_twice_is_found_where_the_body_moves():
     assert doubled_rows([(x, STEP)]).tolist() == rows.tolist()
 
 
+@pytest.mark.parametrize(
+    ("pace", "cut"), [(0.1, False), (0.45, False), (0.55, True), (1.0, True), (2.9, True), (3.2, False)]
+)
+def test_what_comes_to_a_level_half_as_fast_as_before_turns_by_itself(pace: float, cut: bool) -> None:
+    """It leaves as a parabola does; what comes three times as fast as before jumps there."""
+    level = 20.0 + 4 * pace
+    x = np.concatenate([
+        np.arange(21.0), 20.0 + pace * np.arange(1, 5), np.full(9, level), level - 0.05 * np.arange(1, 30) ** 2
+    ])  # fmt: skip
+    low, high, share = clipped(x, 0.0, inertia=False)
+    assert (share > 0) == cut
+    assert math.isnan(low)
+    assert math.isnan(high) != cut
+    # what has inertia does neither
+    assert clipped(x, 0.0, inertia=True)[2] == 0.0
+
+
 @pytest.mark.parametrize("limit", [0.5, 0.9])
 def test_a_sine_that_is_cut_off_is_told_from_one_that_turns(limit):
     sine = np.sin(3 * T)
