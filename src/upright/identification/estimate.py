@@ -28,7 +28,7 @@ from upright.identification.inference.intervals import (
     with_valleys,
 )
 from upright.identification.inference.loop import standing
-from upright.identification.inference.neglected import is_driven, lateness, neglected, with_force
+from upright.identification.inference.neglected import is_driven, lateness, neglected, together_late, with_force
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.ties import ties, with_ties
@@ -303,6 +303,14 @@ def _conclude(
         }
         warnings.append(force.sentence())
     estimates, alike = (estimates, "") if brief or little else with_valleys(estimates, best, log)
+    late_by = None if brief or little else together_late(best)
+    if late_by is not None:
+        name, total = late_by
+        estimates[name] = widened(estimates[name], total.interval)
+        warnings.append(
+            f"{name} stands for delay and lag of the drive together, {1e3 * total.value:.4g} ms in a model that has "
+            "both; its interval holds their sum."
+        )
     scored = [run for run in runs if run.role == "fit" or not brief]
     bands = None if brief else calibrated(best)
     bands = None if bands is None else reduce(with_force, forces, bands)

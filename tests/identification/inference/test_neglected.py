@@ -14,7 +14,7 @@ from upright.identification.inference.bands import FRICTION, MANY, of_another_da
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.neglected import OFFSET, Neglected, consider, with_force
 from upright.identification.model.bands import Bands
-from upright.identification.model.fit import Estimate
+from upright.identification.model.fit import Estimate, Fit
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend_progressively
 from upright.physics import Furuta, Pendulum
@@ -165,3 +165,36 @@ def test_bands_hold_the_mean_square_of_a_force_and_of_what_it_moves() -> None:
     assert wider.names == ("a", "b", OFFSET)
     assert wider.covariance.tolist() == [[4.0, 1.0, 0.0], [1.0, 9.0 + 9.0, 6.0], [0.0, 6.0, 4.25]]
     assert (wider.quantile, wider.logs) == (bands.quantile, bands.logs)
+
+
+def late(asked: dict[str, Parameter]) -> Fit:
+    """Of a Furuta pendulum whose drive has a dead time of 3 ms and a lag of 2.773 ms."""
+    dt, n = 4e-3, 1501
+    t = np.arange(n) * dt
+    u = 0.04 * np.sin(2 * np.pi * 0.7 * t) + 0.03 * np.sin(2 * np.pi * 3.9 * t) + 0.02 * np.sign(np.sin(8.17 * t))
+    drive = {"actuator.delay": 3e-3, "actuator.lag": 2.773e-3}
+    x = simulate(Furuta(**FURUTA), drive, [0.0, 0.0, 0.5, 0.0], u[:, None], dt, samples=n, substeps=4)
+    run = Run(label="one", role="fit", t=t, u=u[:, None], y=x[:, [0, 2], 0], measured=("psi", "theta"))  # type: ignore[arg-type]
+    known = rig(Furuta, FURUTA, {"J_d": 0.006, "b_1": 6e-3})
+    return identify(replace(known, parameters={**known.parameters, **asked}, substeps=4), [noisy(run, 5e-4, seed=1)])
+
+
+DEAD_TIME = Parameter(name="actuator.delay", value=4e-3, unit="s", estimate=True, lower=0.0, upper=0.2)
+
+
+def test_a_dead_time_asked_for_alone_says_that_it_stands_for_a_lag_too_and_holds_their_sum() -> None:
+    """To slow commands ``e^(-s T)/(s tau + 1)`` is ``e^(-s (T + tau))``."""
+    fit = late({"actuator.delay": DEAD_TIME})
+    (said,) = [w for w in fit.warnings if "stands for delay and lag" in w]
+    assert said.startswith("actuator.delay stands for delay and lag of the drive together, 5.7")
+    low, high = fit.estimates["actuator.delay"].interval
+    assert low <= 3e-3 + 2.773e-3 <= high
+    assert high - low < 1e-4
+
+
+def test_a_dead_time_beside_a_lag_that_is_known_stands_for_itself() -> None:
+    lag = Parameter(name="actuator.lag", value=2.773e-3, unit="s")
+    fit = late({"actuator.delay": DEAD_TIME, "actuator.lag": lag})
+    assert not any("stands for delay and lag" in w for w in fit.warnings)
+    low, high = fit.estimates["actuator.delay"].interval
+    assert low <= 3e-3 <= high

@@ -28,6 +28,7 @@ from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import NOISE, Parameter, neutral
 from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.residuals import formulate
 from upright.identification.problem.unknowns import shared_unknowns
 from upright.identification.search.descent import descend
 from upright.identification.search.starts import viscous_terms
@@ -196,6 +197,39 @@ NEAR = 0.02
 """Longest dead time [s] that its fit begins with: a far one throws a swing out of phase."""
 
 DELAY, LAG = "actuator.delay", "actuator.lag"
+
+
+def together_late(best: Optimum) -> tuple[str, Estimate] | None:
+    """Which of dead time and lag of the drive is estimated alone, and the sum of both in a model that has both.
+
+    Slow commands see their sum alone, and the one takes the other's part. None where both are stated, or where the runs
+    show that there is no other one.
+    """
+    problem, names = best.problem, [u.name for u in best.problem.unknowns]
+    (name, other) = (DELAY, LAG) if DELAY in names else (LAG, DELAY)
+    stated = problem.rig.parameters.get(other)
+    if name not in names or any(t.ahead for t in problem.tracks) or (stated and (stated.estimate or stated.value)):
+        return None
+    half = float(best.values[names.index(name)]) / 2
+    second = Parameter(name=other, value=half, unit="s", estimate=True, lower=0.0, upper=LATEST)
+    rig = replace(problem.rig, parameters={**problem.rig.parameters, other: second})
+    both = formulate(rig, [t.run for t in problem.tracks])
+    both.weigh_like(problem)
+    x = both.place(problem.values_at(best.x) | {name: half, other: half})
+    both.settle_steps(x)
+    end = descend(both.normal, x, both.lower, both.upper, tolerance=1e-6, limit=20)
+    if end.interrupted:
+        raise KeyboardInterrupt
+    there = assess(both, end.x)
+    places = [[u.name for u in both.unknowns].index(n) for n in (name, other)]
+    if there.lost or there.pinned[places[1]]:
+        return None
+    slope = np.array([there.values[i] if both.unknowns[i].log else 1.0 for i in places])
+    total, error = (
+        float(there.values[places].sum()),
+        math.sqrt(slope @ there.covariance[np.ix_(places, places)] @ slope),
+    )
+    return name, Estimate.within(total, error, best.quantile * error, "s")
 
 
 @dataclass(frozen=True, kw_only=True)
