@@ -14,7 +14,7 @@ from tests.closed_loop.programs import Pid, closed_loop
 from upright.errors import BadInput
 from upright.records import Record
 from upright.study.load import load_study
-from upright.verbs.log import doctor, init, law, read, show
+from upright.verbs.log import doctor, init, law, read, show, show_logs
 
 T = np.arange(1500) * 4e-3
 SWING = np.round(0.8 * np.exp(-0.3 * T) * np.cos(7 * T), 4)
@@ -124,3 +124,42 @@ def test_a_time_unit_that_is_none_is_refused_in_a_sentence(tmp_path, unit):
     np.savetxt(log, np.column_stack([1e3 * T, SWING]), "%.9g", ",", header="t,theta [rad]", comments="")
     with pytest.raises(BadInput, match=f"a unit of time.*{unit}"):
         read(log, time_unit=unit)
+
+
+def test_a_study_keeps_how_its_log_was_read_and_says_what_is_left_to_measure(tmp_path):
+    """A driven arm leaves masses to weigh; a reader and a clock that were named stand under [defaults]."""
+    log = tmp_path / "arm.csv"
+    t = np.arange(2000) * 2.0  # ms
+    theta = 0.3 * np.sin(0.007 * t)
+    np.savetxt(log, np.column_stack([t, 0.2 * theta, theta, np.sin(0.003 * t)]), "%.9g", ",",
+               header="t,psi [rad],theta [rad],u [V]", comments="")  # fmt: skip
+    drafted = init(log, out=tmp_path / "arm.toml", plant="furuta", time_unit="ms", reader="table")
+    content = tomllib.loads(drafted.value)
+    assert (content["defaults"]["time_unit"], content["defaults"]["reader"]) == ("ms", "table")
+    (points,) = drafted.chapter.parts[0].content
+    (left,) = [s for s in points.sentences if s.startswith("Placeholders to replace by what you measured: ")]
+    named = left.partition(": ")[2].split(", ")
+    assert len(named) == len(set(named)) > 1
+    assert "m_p" in named
+    assert drafted.chapter.steps[0].command.startswith("upright identify ")
+    assert drafted.chapter.steps[0].command.endswith("arm-fit")
+    folder = tmp_path / "studies"
+    folder.mkdir()
+    assert init(log, out=folder, plant="furuta", time_unit="ms").files == (folder / "arm.toml",)
+
+
+def test_logs_are_shown_one_by_one_and_the_last_says_what_to_do_next(tmp_path):
+    """Pictures of one name keep apart; signs that no file should bear are replaced."""
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        np.savetxt(tmp_path / name / "swing one.csv", np.column_stack([T, SWING]), "%.9g", ",", header="t,theta [rad]",
+                   comments="")  # fmt: skip
+    logs = [tmp_path / name / "swing one.csv" for name in ("a", "b")]
+    first, last = show_logs(logs, out=tmp_path / "out")
+    assert [f.name for answer in (first, last) for f in answer.files] == [
+        "show-swing_one.svg", "show-swing_one-2.svg",
+    ]  # fmt: skip
+    assert first.chapter.steps == ()
+    assert last.chapter.steps[0].command == f'upright init "{logs[0]}" -o study.toml'
+    assert all(answer.files == () for answer in show_logs(logs, plot=False))
+    assert show(logs[0], time_unit="s").chapter.steps[0].command.endswith("--time-unit s -o study.toml")
