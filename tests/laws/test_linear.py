@@ -266,3 +266,18 @@ def test_a_former_name_of_a_resolution_means_the_same_and_warns(former, now):
         assert getattr(law, former) == 0.25
     values = as_values(law)
     assert getattr(of_values({former: values.pop(now), **values}), now) == 0.25  # as a log of before says it
+
+
+def following(t, y, r, z, p):
+    """A rule that sees how many references it has."""
+    return (float(len(r)),), z
+
+
+@pytest.mark.parametrize(
+    ("references", "rows"),
+    [(None, [[]]), ([1.0, 2.0], [[1.0], [2.0]]), ([[1.0, 3.0], [2.0, 4.0]], [[1.0, 3.0], [2.0, 4.0]])],
+)
+def test_a_rule_sees_as_many_references_as_its_signal_has_columns(references, rows):
+    rule = Rule(function=following, parameters=[], initial=[], references=references, period=0.1)
+    assert rule.signal().tolist() == rows
+    assert rule.follow(np.zeros((3, 1)), 0.1)[0].ravel().tolist() == [float(len(rows[0]))] * 3
