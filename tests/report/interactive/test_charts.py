@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from tests.report.interactive.drawn import circles, curve, drawings
-from upright.report.interactive.charts import WIDTHS, Chart, ChartLine, ChartPanel, decade_ticks, round_ticks
+from upright.report.interactive.charts import WIDTHS, Chart, ChartLine, ChartPanel, _needed, decade_ticks, round_ticks
 
 T = np.linspace(0.0, 2.0, 101)
 SINE = ChartLine(name="sine", x=T, y=3.0 * np.sin(T), colour="q0")
@@ -93,3 +94,20 @@ def test_colours_are_those_of_the_page_with_one_for_paper():
     markup = chart().svg("a")
     painted = set(re.findall(r'(?:stroke|fill)="(?!none|url)([^"]*)"', markup))
     assert painted <= set(re.findall(r"var\(--[\w-]+, #[0-9a-f]{6}\)", markup))
+
+
+def test_a_curve_is_drawn_through_as_few_of_its_points_as_an_eye_would_not_miss():
+    """No sample is more than a tenth of a pixel from the line between the two that are kept about it."""
+    x = np.linspace(0.0, 600.0, 400)
+    y = 90.0 * np.sin(x / 40.0) + 0.2 * x
+    kept = _needed(x, y)
+    assert kept[0] == 0
+    assert kept[-1] == 399
+    assert len(kept) < 150
+    for a, b in pairwise(kept):
+        chord = np.array([x[b] - x[a], y[b] - y[a]])
+        off = (chord[0] * (y[a:b] - y[a]) - chord[1] * (x[a:b] - x[a])) / np.hypot(*chord)
+        assert np.abs(off).max() <= 0.1
+    assert _needed(x, 3.0 - 0.7 * x) == [0, 399]
+    around = np.linspace(0.0, 2 * np.pi, 9)  # ends where it began
+    assert _needed(10 * np.cos(around), 10 * np.sin(around)) == list(range(9))
