@@ -35,6 +35,19 @@ process.stdout.write(JSON.stringify(best));
 """
 
 
+ENSEMBLE = """
+const ensemble = new Ensemble(DATA), twin = new Twin(DATA), used = [];
+for (let i = 0; i < ROUNDS; i++) {
+  twin.set({friction: 1 + i / 100});
+  const before = process.cpuUsage();
+  ensemble.words(twin.settings, twin.gains);
+  const after = process.cpuUsage(before);
+  used.push((after.user + after.system) / 1e6);
+}
+process.stdout.write(JSON.stringify(used.slice(3)));
+"""
+
+
 ANSWERS = """(async (answers) => {
   const first = (tell) => upright.answered.length ? tell() : requestAnimationFrame(() => first(tell));
   await new Promise(first);
@@ -92,6 +105,17 @@ def motion(rounds: int) -> tuple[list[float], list[float], int]:
     return here, json.loads(node.stdout), len(simulator.wasm(1).code)
 
 
+def ensemble(path: Path, rounds: int) -> list[float]:
+    """CPU seconds in which one processor answers for all rigs of a page, by its own script in Node."""
+    script = path.read_text(encoding="utf-8").partition('<script id="script">')[2].partition("/* the page begins */")[0]
+    body = f"const ROUNDS = {rounds + 3};\n{script}\n{ENSEMBLE}"
+    with tempfile.NamedTemporaryFile("w", suffix=".js", encoding="utf-8") as file:
+        file.write(body)
+        file.flush()
+        node = subprocess.run(["node", file.name], capture_output=True, text=True, check=True)
+    return json.loads(node.stdout)
+
+
 def page(path: Path, answers: int) -> dict[str, Any]:
     """What a browser measures of a page."""
     from playwright.sync_api import sync_playwright
@@ -129,6 +153,9 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
         progress("the page")
         played = up.play(rig(), poles=POLES, out=path)
         size = path.stat().st_size
+        if shutil.which("node"):
+            used = spread(ensemble(path, 5 if quick else 20))
+            lines.append(Line(contender="200 rigs of 3 s in Node, one processor", seconds=used, note="its CPU time"))
         note = f"{size:,} bytes (at most {PAGE:,} asked), {played.numbers['held']} of 200 rigs stabilised"
         try:
             seen = page(path, 5 if quick else 20)

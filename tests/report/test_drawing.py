@@ -1,5 +1,6 @@
 """Does a picture show what is in the data, on a screen and on grey paper?"""
 
+import itertools
 import re
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ from upright.report.drawing import (
     broken,
     decimated,
     figure,
+    narrowed,
     picture_format,
     save,
     svg,
@@ -214,3 +216,29 @@ def test_a_picture_s_format_is_its_ending(name, form):
 def test_a_picture_of_another_format_is_refused():
     with pytest.raises(BadInput, match=r"ending in .svg or .png, got 'a.pdf'"):
         picture_format(Path("a.pdf"))
+
+
+def test_on_a_phone_panels_stand_below_one_another_and_every_letter_can_be_read():
+    """Shown 328 px wide, letters are at least 10 px high, and no text leaves the picture."""
+    drawing = figure(3.0)
+    for k, axes in enumerate(drawing.subplots(1, 3, sharey=True)):
+        axes.plot([0.0, 1.0], [0.0, k])
+        axes.set_title("a title that says at length what is to be seen here and why")
+        axes.set_xlabel("time [s]")
+    drawing.axes[0].set_yticks([0.0, 1.0], ["The class helped me to understand feedback", "agree"])
+    assert narrowed(drawing)
+    drawing.draw_without_rendering()
+    width, height = drawing.bbox.size
+    boxes = [axes.get_tightbbox() for axes in drawing.axes]
+    assert [box.y0 for box in boxes] == sorted((box.y0 for box in boxes), reverse=True)
+    for box, below in itertools.pairwise(boxes):
+        assert below.y1 <= box.y0
+    for box in boxes:
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) > -1  # px
+    view = [float(v) for v in re.search(r'viewBox="([^"]*)"', svg(drawing, "x"))[1].split()]
+    sizes = [float(v) for v in re.findall(r"\bfont(?:-size)?:[^;\"]*?([\d.]+)px", svg(drawing, "x"))]
+    assert min(sizes) * 328 / view[2] > 10
+
+
+def test_a_figure_that_fits_a_phone_is_left_as_it_is():
+    assert not narrowed(figure(2.0, 3.5))

@@ -14,6 +14,7 @@ from functools import cache, wraps
 from io import BytesIO, StringIO
 from itertools import pairwise
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -113,6 +114,39 @@ def figure(height: float, width: float = WIDTH, *, margins: tuple[float, ...] = 
         left, right, top, bottom = margins
         drawing.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
     return drawing
+
+
+NARROW = 3.6
+"""Width of a figure on a phone [inch]: its letters of 9 points stand there as 11 px."""
+
+
+@styled
+def narrowed(drawing: Figure) -> bool:
+    """Lay a figure out for a phone: panels below one another, long titles in several lines; False where it fits one."""
+    width, height = drawing.get_size_inches().tolist()
+    if width <= 1.2 * NARROW:
+        return False
+    panels = [(spec, ax) for ax in drawing.axes if (spec := ax.get_subplotspec()) is not None]
+    grids = {id(spec.get_gridspec()): spec.get_gridspec() for spec, _ in panels}
+    grid = next(iter(grids.values())) if len(grids) == 1 else None
+    places = {(spec.num1, spec.num2) for spec, _ in panels}
+    if grid is not None and grid.ncols > 1 and all(first == last for first, last in places):
+        order = sorted(first for first, _ in places)
+        stacked = drawing.add_gridspec(len(order), 1)
+        for spec, ax in panels:
+            ax.set_subplotspec(stacked[order.index(spec.num1)])
+            ax.tick_params(labelleft=True)
+        height *= len(order) / grid.nrows
+    drawing.set_layout_engine("constrained")
+    drawing.set_size_inches(NARROW, min(height, 2.4 * NARROW * max(1, len(places))))
+    for ax in drawing.axes:
+        for where in ("left", "center"):
+            if title := ax.get_title(loc=where):
+                ax.set_title(fill(title, 34) if "$" not in title else title, loc=where)
+        words = [label.get_text() for label in ax.get_yticklabels()]
+        if max(map(len, words), default=0) > 16:
+            ax.set_yticks(ax.get_yticks(), [fill(word, 16) for word in words])
+    return True
 
 
 @cache

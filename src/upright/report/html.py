@@ -43,7 +43,7 @@ def html_page(page: Chapter | Book) -> str:
 
     chapters = page.chapters if isinstance(page, Book) else (page,)
     scripts = list(dict.fromkeys(s for c in chapters for b in _blocks(c) if (s := getattr(b, "script", ""))))
-    text = _rendered("page.html", page=page, version=__version__, scripts=scripts)
+    text = _rendered("page.html", page=page, version=__version__, scripts=scripts, phone=True)
     return text.replace("<!-- policy -->", _policy(text, chapters), 1)
 
 
@@ -100,15 +100,15 @@ def _templates_of(package: str) -> Environment:
     )  # fmt: skip
 
 
-def _rendered(template: str, **values: Any) -> str:
+def _rendered(template: str, *, phone: bool = False, **values: Any) -> str:
     from markupsafe import Markup
 
     def drawing(picture: Picture, prefix: str) -> Markup:
-        """Mark-up of a picture, with ids that no other chapter of the page has."""
-        return Markup(_ID.sub(rf"\g<1>{prefix}", picture.svg))
+        """Mark-up of a picture, for a `phone` too, with ids that no other chapter of the page has."""
+        return Markup(_ID.sub(rf"\g<1>{prefix}", picture.svg + (picture.narrow if phone else "")))
 
     return rendered(
-        "upright.report", template, **values, drawing=drawing, kind=lambda block: type(block).__name__,
+        "upright.report", template, **values, phone=phone, drawing=drawing, kind=lambda block: type(block).__name__,
         framed=framed, tone=tone, breadth=breadth, brief=brief, scale=shared_scale, evidence=evidence,
     )  # fmt: skip
 

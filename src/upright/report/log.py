@@ -94,14 +94,21 @@ def _remarks(column: Column) -> list[str]:
 def draw_columns(record: Record, inspection: Inspection) -> Figure:
     """One panel per column over time [s]; spans at rest are grey, gaps are marked.
 
-    Left out are columns that do not move, time and sample index; drives come last. Where nothing moves, the constant
-    columns are drawn, so that no axis is empty.
+    Left out are columns that do not move, time and sample index; drives come last, and what two columns show alike is
+    drawn once. Where nothing moves, the constant columns are drawn, so that no axis is empty.
     """
     signals = [c for c in inspection.columns if not any("the time" in s or "index" in s for s in c.remarks)] or [
         *inspection.columns
     ]
     moving = [c for c in signals if not c.constant]
-    columns = sorted(moving or signals, key=lambda c: c.drive)[:MOST_PANELS]
+    alike: dict[str, list[str]] = {}
+    columns: list[Column] = []
+    for column in sorted(moving or signals, key=lambda c: c.drive):
+        same = next((c.name for c in columns if f"the same as '{c.name}'" in column.remarks), None)
+        if same is None:
+            columns.append(column)
+        alike.setdefault(same or column.name, []).append(column.name)
+    columns = columns[:MOST_PANELS]
     drawing = figure(1.1 + 1.15 * len(columns))
     panels: list[Any] = drawing.subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0].tolist()
     for i, (axes, column) in enumerate(zip(panels, columns, strict=True)):
@@ -120,9 +127,10 @@ def draw_columns(record: Record, inspection: Inspection) -> Figure:
             )
         unit = column.unit or (f"{column.guess}?" if column.guess else "")
         name = column.name if len(column.name) <= 30 else "…" + column.name[-29:]
-        name = f"{name}\n[{unit}]" if unit else name  # shown as the log spells it
+        name = " =\n".join([name, *alike[column.name][1:]])  # shown as the log spells it
+        name = f"{name}\n[{unit}]" if unit else name
         axes.set_ylabel(name, rotation=0, ha="right", va="center", parse_math=False)
-        if column.remarks:
+        if column.remarks and not (len(alike[column.name]) > 1 and column.remarks[0].startswith("the same as")):
             axes.set_title(column.remarks[0], fontsize=8.5, color=GREY, parse_math=False)
     hide_inner_times(panels)
     drawing.align_ylabels(panels)

@@ -138,6 +138,16 @@ class Picture:
 
         return svg(drawn, self.name)
 
+    @cached_property
+    def narrow(self) -> str:
+        """Markup of the drawing for a phone; "" where the drawing itself, or what answers in its place, fits."""
+        if isinstance(self.draw, str) or self.answers:
+            return ""
+        from upright.report.drawing import narrowed, svg
+
+        drawn = self.draw()
+        return svg(drawn, f"{self.name}-narrow") if narrowed(drawn) else ""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Live:
