@@ -116,7 +116,7 @@ def test_every_table_has_headings_and_every_picture_words(chapter):
     pictures += [chapter.drawing] if chapter.drawing else []
     assert page.tags.count("figure") == page.tags.count("figcaption") == len(pictures)
     charts = sum(p.kind == "chart" for p in pictures)  # drawn for a desk and for a phone
-    assert page.tags.count("svg") == len(pictures) + charts
+    assert page.tags.count("svg") == len(pictures) + charts + sum(bool(p.narrow) for p in pictures)
     described = page.named("div", "aria-label")
     assert len(described) == len(pictures)
     assert all(described)
