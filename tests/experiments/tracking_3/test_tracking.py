@@ -557,3 +557,12 @@ def test_a_step_has_two_digits_and_never_more_than_its_bound(monkeypatch, k_pf):
     assert chosen.reason == "bounded by effort"
     asked = choose_step(rig, laws, 0.0123)
     assert (asked.size, asked.reason) == (0.0123, "as requested")
+
+
+@pytest.mark.parametrize("which", [(5,), (1, 7), (0, 2)])
+def test_a_set_that_table_2_has_not_is_refused_among_others_too(which):
+    with pytest.raises(BadInput, match="Table 2 has sets 1 to 4"):
+        pd.check_sets(which, None)
+    pd.check_sets((1, 4), None)
+    with pytest.raises(BadInput, match="nothing to follow with"):
+        pd.check_sets((), None)
