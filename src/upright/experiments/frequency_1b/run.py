@@ -229,7 +229,7 @@ def _study(path: Path, data: Path | None) -> tuple[GreyBox, str, list[Record], l
         columns = {"u": run.u[:, 0], **{n: run.y[:, j] for j, n in enumerate(run.measured)}}
         units = {c.name: c.unit for c in study.model.plant.coordinates if c.name in run.measured}
         records.append(Record(t=run.t, signals=columns, units=units, inputs=("u",), outputs=run.measured))
-    return study.model, study.plant, records, list(runs[0].resolution or [0.0] * len(runs[0].measured)), study.hardware
+    return study.model, study.plant, records, list(runs[0].quanta), study.hardware
 
 
 def _logs(sources: Sequence[Path], request: LogRequest) -> FrequencyResponse:

@@ -51,7 +51,7 @@ class FaultyEncoder:
         Coordinate.
     factor : float
         What it shows over what is true.
-    found, error : float
+    estimate, error : float
         The same as measured hanging, with its standard error.
     refused : bool
         Whether the hanging rig gave it away.
