@@ -116,3 +116,13 @@ def test_twins_of_a_kind_differ_by_some_percent_and_their_friction_by_a_fifth(ki
     assert pieces.shape == (300, 4)
     assert np.std(pieces) == pytest.approx(1.0, abs=4 / np.sqrt(2400))
     assert [on.rig.seed for on in drawn] == list(range(1, 301))
+
+
+@pytest.mark.parametrize("seconds", [1.0, 3.0])
+def test_a_step_stands_for_its_seconds_and_is_gone_for_as_many(seconds):
+    record = step_log(drawn_twin(3, "rectilinear"), 1, seconds=seconds)
+    on = record["u"] > 0
+    assert np.sum(on) * record.period == pytest.approx(seconds, abs=1.6 * record.period)
+    assert record.t[-1] - record.t[0] == pytest.approx(2 * seconds, abs=1.1 * record.period)
+    assert on[0]
+    assert not on[-1]
