@@ -50,6 +50,7 @@ _ON_DARK = {
 }  # fmt: skip
 """Custom properties of a page's style that may replace a colour of a picture, ``--mpl-blue`` and so on."""
 
+_FAMILY = "'DejaVu Sans', sans-serif"  # of every text of a picture, said once
 WIDTH = 7.4  # inches; a column of the page
 _STYLE: dict[Any, Any] = {
     "font.size": 9,
@@ -144,8 +145,10 @@ def narrowed(drawing: Figure) -> bool:
             if title := ax.get_title(loc=where):
                 ax.set_title(fill(title, 34) if "$" not in title else title, loc=where)
         words = [label.get_text() for label in ax.get_yticklabels()]
-        if max(map(len, words), default=0) > 16:
+        if max(map(len, words), default=0) > 16 and not any("$" in word for word in words):
             ax.set_yticks(ax.get_yticks(), [fill(word, 16) for word in words])
+        for text in ax.texts if len(ax.texts) > 20 else ():  # of the cells of a table
+            text.set_fontsize(6)
     return True
 
 
@@ -186,10 +189,12 @@ def svg(drawing: Figure, name: str) -> str:
     text = re.sub(r"(\s*\n)+\s*", "\n", text)
     text = re.sub(r"(?<=: )#[0-9a-fA-F]{6}\b", _replaceable, text)
     text = re.sub(r'(?<=style=")[^"]*', lambda style: re.sub(r"([;:]) ", r"\1", style[0]), text)
+    text = text.replace(f"font-family:{_FAMILY};", "")
     opening = text[: text.index(">")]
     responsive = re.sub(r'\s(width|height)="[^"]*"', "", opening)
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
-    return f'{responsive} style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"{text[len(opening) :]}'
+    drawn = f'font-family="{_FAMILY}" style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"'
+    return f"{responsive} {drawn}{text[len(opening) :]}"
 
 
 def _short(path: re.Match[str]) -> str:

@@ -87,6 +87,10 @@ class Table:
     anchors: tuple[str, ...] = ()
 
 
+LARGEST_NARROW = 40_000
+"""Bytes of a drawing that is laid out for a phone too; a page is mailed, and a second layout is a second drawing."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Picture:
     """A drawing, the caption under it, and a description for readers who cannot see it.
@@ -140,13 +144,14 @@ class Picture:
 
     @cached_property
     def narrow(self) -> str:
-        """Markup of the drawing for a phone; "" where the drawing itself, or what answers in its place, fits."""
+        """Markup of the drawing for a phone; "" where the drawing, or what answers, fits, or where it is large."""
         if isinstance(self.draw, str) or self.answers:
             return ""
         from upright.report.drawing import narrowed, svg
 
         drawn = self.draw()
-        return svg(drawn, f"{self.name}-narrow") if narrowed(drawn) else ""
+        text = svg(drawn, f"{self.name}-narrow") if narrowed(drawn) else ""
+        return text if len(text) < LARGEST_NARROW else ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
