@@ -6,7 +6,7 @@
 #include <stdbool.h>
 
 typedef struct {
-    double m_p, l_cg, r, J_d, J_p, J_a, b_1, b_2, g; /* as in src/upright/physics/pendulums.py */
+    double m_p, l_cg, r, J_d, J_p, J_a, b_1, b_2, g; /* as in src/upright/physics/furuta.py */
     double k_psi;     /* anchors the arm to ground; 0 when nobody says */
     double gain;      /* torque per unit of command */
     double step;      /* command of one step of the converter */

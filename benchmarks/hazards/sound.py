@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.story import POLES
-from upright.control.still import StillDrive, StillPendulum
+from upright.control.dead_encoder import StillDrive, StillPendulum
 from upright.control.watch import Watch
 from upright.experiments.nonideal import nonideal
 from upright.gains import feedback, filtered, place

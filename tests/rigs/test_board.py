@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.control.still import StillDrive
+from upright.control.dead_encoder import StillDrive
 from upright.errors import RigStopped
 from upright.laws import state_feedback
 from upright.records import Record

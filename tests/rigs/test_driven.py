@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from tests.rigs.test_supervisor import DUTY, LAW, MODEL, RIG, Scene
-from upright.control.still import LEAST_SWUNG, SWUNG, UNSEEN, WITHIN, StillDrive, StillPendulum
+from upright.control.dead_encoder import LEAST_SWUNG, SWUNG, UNSEEN, WITHIN, StillDrive, StillPendulum
 from upright.control.watch import HELD_BY, OUT_OF_TRUE, sticking
 from upright.errors import RigStopped
 from upright.experiments.nonideal import nonideal

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from upright.control.still import UNSEEN, StillDrive
+from upright.control.dead_encoder import UNSEEN, StillDrive
 from upright.errors import BadInput, RigStopped
 from upright.gains import feedback, filtered, place
 from upright.laws import Rule, state_feedback

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.control.gross import GrossFaults
+from upright.control.gross_faults import GrossFaults
 from upright.control.trial import Trial, trial
 from upright.control.witnesses import Witnesses
 from upright.laws import Law

@@ -1,4 +1,4 @@
-"""How much effort is good posture worth? Gains from weights, and the weight that just stays within the limit."""
+"""LQR: gains from weights, and the weight of effort that just stays within the limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much a loop stands: every frequency at which it crosses the unit circle or the real axis, and what is left there.
+"""Stability margins of a loop: where it crosses the unit circle or the real axis, and what is left there.
 
 A loop gain L crosses the unit circle where ``1 - L(1/z) L(z)`` is zero, the real axis where ``L(z) - L(1/z)`` is; both
 are zeros of a linear system, eigenvalues of a pencil of twice its order (Boyd, Balakrishnan and Kabamba, Math. Control

@@ -1,4 +1,4 @@
-"""Gains that put the poles where they are wanted, the poles that they give, and the prefilter beside them.
+"""Pole placement by Ackermann's formula, the poles that the gains give, and the prefilter beside them.
 
 Ackermann's formula and eigenvalues take 60 digits, which keeps rounding out of the sum: on a model of ten states with
 poles from 1 to 10, eigenvalues in double precision are off by 4.6, whatever the gains.

@@ -11,9 +11,10 @@ from upright.declared import Declared
 from upright.errors import BadInput, UprightError, nearest
 from upright.files import OWN_FILE, regular
 from upright.physics.equations import Derived, DryJoint
+from upright.physics.furuta import Furuta
 from upright.physics.links import DoublePendulum, DoublePendulumAbsolute, FlexibleLink
 from upright.physics.oscillators import added_inertia, added_mass, chain
-from upright.physics.pendulums import CartPendulum, Furuta, Pendulum
+from upright.physics.pendulums import CartPendulum, Pendulum
 from upright.physics.plant import Plant
 from upright.physics.statement import Coordinate, Input, Joint
 

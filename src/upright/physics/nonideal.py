@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from upright.physics.pendulums import CartPendulum, Furuta
+from upright.physics.furuta import Furuta
+from upright.physics.pendulums import CartPendulum
 from upright.quantities import quantity
 from upright.systems import StateSpace
 

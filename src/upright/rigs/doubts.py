@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from upright.control.still import StillDrive, StillPendulum
+from upright.control.dead_encoder import StillDrive, StillPendulum
 from upright.control.watch import Suspicion, Watch
 from upright.rig import Rig
 from upright.rigs.protocol import Fault

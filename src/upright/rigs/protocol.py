@@ -1,4 +1,4 @@
-"""What every rig answers to: a twin, a replay of a record, firmware at the end of a wire, a vendor's board.
+"""The protocol of every rig: a twin, a replay of a record, firmware at the end of a wire, a vendor's board.
 
 A rig moves between five modes, and nothing but a fault leaves `Mode.HOST` or `Mode.MCU` without a request::
 

@@ -1,4 +1,4 @@
-"""What stands between a law and a rig on the host's side: nothing is armed unasked, and zero goes out before a word.
+"""The supervisor between a law and a rig, on the host: nothing is armed unasked, zero goes out before a word.
 
 The order is fixed: open and read limits back, zero the encoders where it hangs, a small pulse whose answer is compared
 with the model's, the start window, a start without a jump; then, tick by tick, a look at the rig's own faults, at
@@ -29,8 +29,8 @@ from upright.rig import Rig
 from upright.rigs.board import Board, fault_text
 from upright.rigs.doubts import Doubts
 from upright.rigs.law import RunningLaw, absurdity, for_rig
-from upright.rigs.obedience import LOOKED, energy_risen
 from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig, Mode, SelfTest, Tick
+from upright.rigs.still_driven import LOOKED, energy_risen
 from upright.rigs.tick_length import TickLength
 from upright.rigs.twin import TwinPort
 
@@ -502,7 +502,7 @@ class Supervisor:
 
 def pulse_response(model: Rig, zero: str, pulse: float) -> SelfTest:
     """What a model does under a pulse [command unit] where its encoders are zeroed, if nothing limits it."""
-    board = Board(TwinPort(replace(model, scales=()), zero, full_scale=2.0 * max(model.limit, abs(pulse))))
+    board = Board(TwinPort(replace(model, scales=None), zero, full_scale=2.0 * max(model.limit, abs(pulse))))
     about = board.open()
     board.clear_fault()
     board.configure(_free(about))

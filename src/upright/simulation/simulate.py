@@ -1,4 +1,4 @@
-"""How does this plant move from here?"""
+"""Simulation of a plant from a given state, under commands or a law, one motion or many side by side."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ from upright.errors import BadInput, nearest
 from upright.files import keeps_its_inputs
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
+from upright.verbs.export.exported import Exported
 from upright.verbs.export.law import controller_of, write_law
 from upright.verbs.export.rig import write_rig
-from upright.verbs.export.written import Exported
 from upright.verbs.pages import folder_if_given
 
 if TYPE_CHECKING:

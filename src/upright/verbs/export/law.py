@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from upright.errors import BadInput
 from upright.files import read_text
 from upright.verbs.answer import Answer
-from upright.verbs.export.written import Exported, written
+from upright.verbs.export.exported import Exported, exported
 
 if TYPE_CHECKING:
     from upright.exports.controller import SampledController
@@ -99,4 +99,4 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path | 
             "samples": len(test.readings), "single_precision_misses": test.single,
         },
     )  # fmt: skip
-    return written({n: text.encode() for n, text in texts.items()}, resting_on(page, made.basis), at, target.name)
+    return exported({n: text.encode() for n, text in texts.items()}, resting_on(page, made.basis), at, target.name)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
-from upright.verbs.export.written import Exported, written
+from upright.verbs.export.exported import Exported, exported
 from upright.verbs.handover import SAVED, called, rig_of
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def write_rig(source: Any, target: RigTarget, at: Path | None, limit: float | No
         rig=rig, called=called(source), folder=at or Path(), store=lambda: _saved(source, at), limit=limit
     )
     contents, page = target.write(export)
-    return written(contents, resting_on(page, rig.basis), at, target.name)
+    return exported(contents, resting_on(page, rig.basis), at, target.name)
 
 
 def _saved(source: Any, at: Path | None) -> Path:

@@ -30,7 +30,7 @@ class Exported(Answer[tuple[str, ...]]):
         self.contents = contents
 
 
-def written(contents: Mapping[str, bytes], page: Chapter, at: Path | None, to: str) -> Exported:
+def exported(contents: Mapping[str, bytes], page: Chapter, at: Path | None, to: str) -> Exported:
     """An export, its files in a folder where one is named; otherwise nothing is proposed that reads them."""
     names = [str((at or Path()) / name) for name in contents]
     page = replace(page, numbers={"to": to, "files": names, **page.numbers})

@@ -13,7 +13,7 @@ from upright.errors import RigStopped
 from upright.experiments.nonideal import nonideal
 from upright.rig.makes import make_rig
 from upright.rigs import Fault
-from upright.rigs.obedience import LOOKED, energy_risen
+from upright.rigs.still_driven import LOOKED, energy_risen
 from upright.simulation import simulate
 
 N = round(LOOKED / RIG.period)

@@ -11,8 +11,8 @@ from scipy.signal import lti
 
 from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.sound import law_for
-from upright.control.gross import FACTORS, HARDEST, ROUNDING, WEIGHT_SHARE, WINDOW, GrossFaults
-from upright.control.gross import STRUCK as FADING
+from upright.control.gross_faults import FACTORS, HARDEST, ROUNDING, WEIGHT_SHARE, WINDOW, GrossFaults
+from upright.control.gross_faults import STRUCK as FADING
 from upright.control.watch import held_by
 from upright.control.witnesses import Witnesses
 from upright.experiments.nonideal import nonideal
