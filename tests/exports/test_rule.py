@@ -182,7 +182,7 @@ def test_the_verb_writes_a_sketch_and_says_what_a_mega_does_not(tmp_path):
     ("rule", "how", "sentence"),
     [
         (replace(BARE, measured=()), {"to": "c"}, r"needs its readings' names: dataclasses.replace\(rule, measured="),
-        (replace(BARE, period=0.0), {"to": "c"}, "needs its sample period"),
+        (replace(BARE, period=None), {"to": "c"}, "needs its sample period"),
         (replace(BARE, parameters=np.ones((1, 2))), {"to": "c"}, "given for 2 lanes"),
         (BARE, {"to": "matlab"}, "a rule goes to c, arduino, python in double precision.* got matlab"),
         (BARE, {"to": "c", "single": True}, "got single"),

@@ -70,7 +70,7 @@ def test_the_unit_of_a_column_is_guessed_from_its_name_and_its_steps(name, x, un
 def test_a_stated_unit_goes_before_any_guess():
     seen = column("theta", 2 * math.pi / 2000 * np.round(500 * WAVE), unit="m")
     assert (seen.unit, seen.guess) == ("m", "m")
-    assert seen.resolution.counts_per_rev == 0  # a length has steps, and no revolutions
+    assert seen.resolution.counts_per_rev is None  # a length has steps, and no revolutions
     assert seen.resolution.step == pytest.approx(2 * math.pi / 2000)
 
 

@@ -163,7 +163,7 @@ def as_json(recovery: Recovery) -> str:
             name: {"value": g.value, "low": g.interval[0], "high": g.interval[1], "meaning": g.meaning}
             for name, g in recovery.gains.items()
         },
-        "period_s": law.period,
+        "period_s": law.needed_period,
         "samples_per_row": recovery.every,
         "limit": law.limit if recovery.saturated else None,
         "windup": law.windup,
@@ -206,14 +206,14 @@ def loop_written(recovery: Recovery) -> str:
         if any(values):
             parts.append(f"{key} = {_list([f'{v:.6g}' for v in values])}")
     if first.filter.pole:
-        tau = law.period * first.filter.pole / (1 - first.filter.pole)
+        tau = law.needed_period * first.filter.pole / (1 - first.filter.pole)
         parts.append(f'tau = "{tau:.6g} s"')
     if first.filter.second:
         parts.append(f"taps = [{1 - first.filter.second:.4g}, {first.filter.second:.4g}]")
     if first.on == "measurement":
         parts.append('on = "measurement"')
     parts.append(f"measured = {_coordinates(recovery)}")
-    references = [c.reference for c in channels if c.reference]
+    references = [c.reference for c in channels if c.reference is not None]
     if references:
         parts.append(f"reference = {_list([_text(r) for r in references])}")
     if recovery.saturated:
@@ -223,7 +223,7 @@ def loop_written(recovery: Recovery) -> str:
     if law.delay:
         parts.append(f"delay = {law.delay:g}")
     if recovery.every > 1:
-        parts.append(f'period = "{law.period * 1e3:.6g} ms"')
+        parts.append(f'period = "{law.needed_period * 1e3:.6g} ms"')
     return f'loop = {{ {", ".join(parts)}, units = "log" }}'
 
 

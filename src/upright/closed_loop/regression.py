@@ -256,7 +256,9 @@ def law_of(best: Regression, channels: Sequence[Channel], signals: Signals, limi
     first: dict[str, float] = {}
     for channel in channels:
         y, r = signals.pairs[signals.names.index(channel.measured)]
-        first |= {channel.measured: float(y[0])} | ({channel.reference: float(r[0])} if r is not None else {})
+        first |= {channel.measured: float(y[0])} | (
+            {channel.reference: float(r[0])} if r is not None and channel.reference is not None else {}
+        )
     smoothed = {name: gains.get(("start", i), 0.0) for i, name in enumerate(signals.names)}
     return replace(law, initial=memory_before(channels, first, constant=constant, smoothed=smoothed))
 

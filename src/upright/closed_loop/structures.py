@@ -55,7 +55,7 @@ class Channel:
     """
 
     measured: str
-    reference: str = ""
+    reference: str | None = None
     kp: float = 0.0
     ki: float = 0.0
     kd: float = 0.0
@@ -90,7 +90,7 @@ def joined(channels: Sequence[Channel], *, period: float, bias: float = 0.0, **f
     if not 0 < period < math.inf:
         raise BadInput(f"a law needs its sample period in s, above zero, got {period}.")
     measured = tuple(dict.fromkeys(c.measured for c in channels))
-    references = tuple(dict.fromkeys(c.reference for c in channels if c.reference))
+    references = tuple(dict.fromkeys(c.reference for c in channels if c.reference is not None))
     inputs = (*measured, *references)
     rows: list[tuple[dict[int, float], Array, float, float]] = []  # memory row, its drive, output gain, initial
     D = np.zeros(len(inputs))
@@ -98,7 +98,7 @@ def joined(channels: Sequence[Channel], *, period: float, bias: float = 0.0, **f
         e = np.zeros(len(inputs))
         e[inputs.index(c.measured)] = -1.0
         s = e.copy()
-        if c.reference:
+        if c.reference is not None:
             e[inputs.index(c.reference)] += 1.0
         s = e if c.on == "error" else s
         D += c.kp * e
@@ -152,7 +152,9 @@ def memory_before(
         if c.ki:
             out.append(constant / c.ki if c is sums[0] else 0.0)
         if c.kd:
-            out.append(-first[c.measured] + (first[c.reference] if c.reference and c.on == "error" else 0.0))
+            out.append(
+                -first[c.measured] + (first[c.reference] if c.reference is not None and c.on == "error" else 0.0)
+            )
             out.append((smoothed or {}).get(c.measured, 0.0) / c.kd)
     return np.array([*out, constant] if constant and not sums else out)
 

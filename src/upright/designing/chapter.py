@@ -236,7 +236,7 @@ def _at_rest(held: Holding) -> dict[str, Any]:
 def _readings(design: Designed) -> list[dict[str, Any]]:
     """What the law reads, one by one: encoder's step and sign as described."""
     rig, on = design.rig, design.request.on
-    steps = dict(zip(rig.outputs, design.request.resolution, strict=False))
+    steps = dict(zip(rig.outputs, design.request.resolution or (), strict=False))
     return [
         {
             "name": name,

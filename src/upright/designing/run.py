@@ -73,10 +73,10 @@ class DesignRequest:
     lag: float | None = None
     speed: str = "filtered"
     memory: float = 0.5
-    resolution: tuple[float, ...] = ()
+    resolution: tuple[float, ...] | None = None
     limit: float | None = None
-    start: tuple[float, ...] = ()
-    track: str = ""
+    start: tuple[float, ...] | None = None
+    track: str | None = None
     sampled: bool = False
     on: Rig | None = None
     proposed: float | None = None
@@ -244,7 +244,7 @@ def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
     else:
         model = rig.linear(request.at)
         sampled = model.to_sampled(request.period, _late(rig, request), rig.lag if request.lag is None else request.lag)
-    start = np.array(request.start) if request.start else _tilt(rig)
+    start = _tilt(rig) if request.start is None else np.array(request.start)
     if model.B.shape[1] != 1:
         raise BadInput(f"upright design is for one input, and this model has {model.B.shape[1]}; use place.")
     K, placement, R = _gains(model, request, start)
@@ -265,7 +265,7 @@ def design_for(rig: Rig | StateSpace, request: DesignRequest) -> Designed:
     gains = place_sampled(sampled, ways[speed], wanted) if needed and not observed else None
     used = gains if request.sampled and gains is not None else K
     k_pf = None
-    if request.track:
+    if request.track is not None:
         if request.track not in rig.outputs:
             raise BadInput(f"nothing called '{request.track}' is measured; --track one of {', '.join(rig.outputs)}.")
         i = rig.outputs.index(request.track)

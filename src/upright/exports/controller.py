@@ -90,7 +90,8 @@ class SampledController:
         rest = [f"{v!r}" for v in self.law.arrays()["target"][0].tolist()] if isinstance(self.law, Law) else []
         sentences = [
             *filter(None, [harmless(self.basis.first_line())]),
-            f"Call it every {self.law.period!r} s, with readings taken just before, and put the command out at once.",
+            f"Call it every {self.law.needed_period!r} s, with readings taken just before, and put the command out at "
+            "once.",
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
             *filter(None, [self._zeroing()]),
             f"Commands: {', '.join(self.commands)}{unit}; "
@@ -125,8 +126,7 @@ def of_law(law: Any) -> SampledController:
     lanes = max(law.widths().values())
     if lanes > 1:
         raise BadInput(f"one law can be exported, and this one is given for {lanes} lanes; take one: law.of_lanes(...)")
-    if not law.period:
-        raise BadInput("an exported law needs its sample period; give it: dataclasses.replace(law, period=1e-3).")
+    _ = law.needed_period  # says so where there is none
     single = {name: a[..., 0] for name, (a, axes) in law.arrays().items() if a.ndim > axes}
     made = replace(law, **single) if single else law
     references = tuple(f"r{i}" for i in range(law.signal().shape[1]))

@@ -102,7 +102,7 @@ def kernel_commands(law: Law | Rule, readings: Array, inputs: int) -> Array:
     held = {name: Held(q=grid[:, i], v=still, a=still) for i, name in enumerate(names)}
     x0 = np.zeros(2 * n)
     x0[::2] = readings[0]
-    motion = simulate(nothing, {}, x0, None, law.period, samples=len(readings), loop=law, held=held)
+    motion = simulate(nothing, {}, x0, None, law.needed_period, samples=len(readings), loop=law, held=held)
     return motion[:, 2 * n :, 0]
 
 

@@ -45,6 +45,8 @@ class Controller(ABC):
         Largest command that leaves the controller, either way; the actuator's own limit acts besides.
     delay : float
         Computational delay in samples, whole or not; the output is zero before the first one arrives.
+    period : float, optional
+        Time between two samples that it is made for [s], where it is known.
     """
 
     references: ArrayLike | None = None
@@ -52,6 +54,7 @@ class Controller(ABC):
     command_resolution: ArrayLike = 0.0
     limit: float = math.inf
     delay: float = 0.0
+    period: float | None = None
     quantum = former("resolution")
     command_quantum = former("command_resolution")
 
@@ -60,11 +63,20 @@ class Controller(ABC):
             raise BadInput(f"the delay must be at least 0 samples, got {self.delay:g}; give it in samples.")
         if not self.limit > 0.0:
             raise BadInput(f"a law needs a limit above zero, got {self.limit:g}.")
+        if self.period is not None and not 0.0 < self.period < math.inf:
+            raise BadInput(f"a law needs its sample period in s, above zero, got {self.period}.")
         if np.any(np.asarray(self.resolution) < 0.0) or np.any(np.asarray(self.command_resolution) < 0.0):
             raise BadInput("a resolution must be at least 0, which means no rounding.")
         r = self.signal()
         if r.ndim != 2 or (r.shape[1] > 0 and r.shape[0] == 0) or not np.isfinite(r).all():
             raise BadInput(f"references need finite values in shape (T, references), got {r.shape}.")
+
+    @property
+    def needed_period(self) -> float:
+        """The `period`, where it cannot do without."""
+        if self.period is None:
+            raise BadInput("this law needs its sample period; give it: dataclasses.replace(law, period=1e-3).")
+        return self.period
 
     @abstractmethod
     def arrays(self) -> dict[str, tuple[Array, int]]:
@@ -147,8 +159,6 @@ class Law(Controller):
         are for that sample. What differences and filters remember goes on.
     measured, reference_names : tuple of str
         Names of readings and references, where a log or a study gives them.
-    period : float
-        Time between two samples that the matrices are made for [s], where it is known; 0 else.
     """
 
     A: Array
@@ -162,7 +172,6 @@ class Law(Controller):
     windup: Windup = "free"
     measured: tuple[str, ...] = ()
     reference_names: tuple[str, ...] = ()
-    period: float = 0.0
 
     def __post_init__(self) -> None:
         for name in "ABCD":
@@ -188,8 +197,6 @@ class Law(Controller):
                 raise BadInput(f"{name} of a law needs finite numbers, got {np.ravel(getattr(self, name)).tolist()}.")
         if self.windup not in ("free", "hold"):
             raise BadInput(f'windup is "free" or "hold", got {self.windup!r}.')
-        if not 0.0 <= self.period < math.inf:
-            raise BadInput(f"a law needs its sample period in s, above zero, got {self.period}.")
         super().__post_init__()
 
     @property

@@ -75,15 +75,12 @@ class Rule(Controller):
     parameters : array, shape (p,) or (p, lanes)
     measured : tuple of str
         Names of the readings, where it is to be exported.
-    period : float
-        Time between two samples that it is made for [s], where it is known; 0 else.
     """
 
     function: Function
     initial: ArrayLike = ()
     parameters: ArrayLike = ()
     measured: tuple[str, ...] = ()
-    period: float = 0.0
 
     def __post_init__(self) -> None:
         text_of(self.function)

@@ -123,8 +123,8 @@ def inspect_record(record: Record) -> Inspection:
         if not (c.drive or c.constant or any("time" in s or "index" in s for s in c.remarks))
     ]
     return Inspection(
-        file=record.provenance.file,
-        reader=record.provenance.reader,
+        file=record.provenance.file or "",
+        reader=record.provenance.reader or "",
         time=time_base(record),
         columns=columns,
         rests=_rests(record.t, moving),
@@ -168,7 +168,7 @@ def _column(record: Record, name: str) -> Column:
     drive = _is_drive(name, x, guess)
     turn = {"rad": 1.0, "deg": math.pi / 180}.get(guess, 0.0)
     exact = turn and step.step and not step.decimals
-    step = replace(step, counts_per_rev=counts_per_rev(turn * step.step) if exact else 0)
+    step = replace(step, counts_per_rev=counts_per_rev(turn * step.step) if exact else None)
     return Column(
         name=name,
         unit=unit,

@@ -121,18 +121,19 @@ _FITS = 0.08  # rms distance from the grid in steps; 0.289 when there is no grid
 class Resolution:
     """Step of a column in its unit, 0 when there is none; `decimals` says that it is the rounding of the text.
 
-    `hidden` is what no step shows: the largest that the text's digits, or the noise, could hide, in the same unit.
+    `counts_per_rev` are those of an encoder with that step, where it is one. `hidden` is what no step shows: the
+    largest that the text's digits, or the noise, could hide, in the same unit.
     """
 
     step: float = 0.0
     decimals: bool = False
-    counts_per_rev: int = 0
+    counts_per_rev: int | None = None
     hidden: float = 0.0
 
     def __str__(self) -> str:
         if not self.step:
             return ""
-        if self.counts_per_rev:
+        if self.counts_per_rev is not None:
             return f"2 pi/{self.counts_per_rev} = {self.step:.4g}"
         return f"{self.step:.4g}" + (" (decimals)" if self.decimals else "")
 
@@ -166,12 +167,12 @@ def _common_divisor(values: Array, digit: float) -> float:
     return float(np.gcd.reduce(whole - whole[0])) * digit if whole.size > 2 else 0.0
 
 
-def counts_per_rev(step: float) -> int:
-    """Counts of an encoder whose step is `step` rad, when that is a number encoders are made in; else 0."""
+def counts_per_rev(step: float) -> int | None:
+    """Counts of an encoder whose step is `step` rad, when that is a number encoders are made in."""
     count = 2 * math.pi / step
     nearest = round(count)
     made = 200 <= nearest <= 1 << 20 and (nearest % 100 == 0 or (nearest & (nearest - 1)) == 0)
-    return nearest if made and abs(count - nearest) < 2e-4 * nearest else 0
+    return nearest if made and abs(count - nearest) < 2e-4 * nearest else None
 
 
 def _levels(values: Array, rounding: float) -> Array:

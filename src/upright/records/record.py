@@ -39,17 +39,17 @@ KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """Where a record came from.
+    """Where a record came from; None where nobody said.
 
-    `window` is empty, or (first, last) time in s of the part kept; `notes` are sentences about what
-    the reader did or found, in order.
+    `window` is (first, last) time in s of the part kept; `notes` are sentences about what the reader did or found, in
+    order.
     """
 
-    file: str = ""
-    sha256: str = ""
-    reader: str = ""
-    rig: str = ""
-    window: tuple[float, ...] = ()
+    file: str | None = None
+    sha256: str | None = None
+    reader: str | None = None
+    rig: str | None = None
+    window: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 
     def note(self, *sentences: str) -> Provenance:
@@ -229,14 +229,16 @@ class Record(Shown):
         try:
             about = json.loads(description) if description else {}
             source: dict[str, Any] = dict(about.get("provenance", {}))
-            window = tuple(float(v) for v in source.pop("window", ()))
+            start, stop = source.pop("window", None) or (None, None)
             notes = tuple(str(v) for v in source.pop("notes", ()))
             units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items() if k in signals}
             units |= {k: v for k, v in (stated or {}).items() if v}
             # columns may have been dropped since the description was written
             inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
             outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
-            provenance = Provenance(**{k: str(v) for k, v in source.items()}, window=window, notes=notes)
+            window = None if start is None else (float(start), float(stop))
+            texts = {k: str(v) for k, v in source.items() if v}  # files of before 1.0 say "" where nobody said
+            provenance = Provenance(**texts, window=window, notes=notes)
         except (ValueError, TypeError, AttributeError, RecursionError) as error:
             raise BadInput(
                 f"The description of the record must be the JSON this package wrote, got {description[:60]!r}"

@@ -56,7 +56,7 @@ def _circumstances(record: Record, recovery: Recovery) -> list[str]:
     """How often the law was evaluated, how late, and where it was limited."""
     law, rows = recovery.law, record.t.size / recovery.rows.size
     unit = f" {recovery.unit}" if recovery.unit else ""
-    rate = f"every {law.period * 1e3:.5g} ms"
+    rate = f"every {law.needed_period * 1e3:.5g} ms"
     rate += f", {recovery.every} times per row" if recovery.every > 1 else ", once per row" if rows < 1.5 else ""
     sentences = [f"Evaluated {rate}; {'a sample late' if law.delay else 'answers at the same sample'}."]
     if recovery.saturated:

@@ -57,8 +57,8 @@ class Rig(Shown):
         ``"guessed"``; a number that is not named was given.
     draws : tuple of (Plant, float)
         Plants and gains drawn from a fit's covariance; empty without one.
-    scales : tuple of float
-        What the encoders show over what is true; empty where the counts per unit are right.
+    scales : tuple of float, optional
+        What the encoders show over what is true; None where the counts per unit are right.
     mounting : Mounting, optional
         What else the encoders show: play and shafts off centre. Logs have both; a loop, which stays about one point,
         has the error and the slope that a shaft off centre has there.
@@ -75,7 +75,7 @@ class Rig(Shown):
     hardware: Hardware = field(default_factory=Hardware)
     sources: Mapping[str, str] = field(default_factory=dict[str, str])
     draws: tuple[tuple[Plant, float], ...] = ()
-    scales: tuple[float, ...] = ()
+    scales: tuple[float, ...] | None = None
     mounting: Mounting | None = None
     seed: int = 0
     basis: Basis = DESCRIBED

@@ -50,9 +50,9 @@ class RunRequest:
 
     rig: Path
     law: Path | None = None
-    excite: str = ""
-    reference: str = ""
-    samples: tuple[float, ...] = ()
+    excite: str | None = None
+    reference: str | None = None
+    samples: tuple[float, ...] | None = None
     exploration: Rule | None = None
     stem: str = "run"
     seconds: float = 30.0
@@ -67,13 +67,13 @@ class RunRequest:
     own_process: bool = False
 
     def __post_init__(self) -> None:
-        if (self.law is None) == (not self.excite and not self.samples and self.exploration is None):
+        if (self.law is None) == (self.excite is None and self.samples is None and self.exploration is None):
             raise BadInput('A run needs either a law (--law design.json) or a signal (--excite "sine 0.5 2").')
         if not 0 < self.seconds <= 86_400:
             raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
         if self.mode not in MODES:
             raise BadInput(f"--mode is host or mcu, got '{self.mode}'.")
-        if self.reference and self.law is None:
+        if self.reference is not None and self.law is None:
             raise BadInput("a reference is for a law; a signal that is put out blindly is --excite.")
 
 
@@ -252,7 +252,7 @@ def run_rig(
     elif request.exploration is not None:
         law = request.exploration
     else:
-        samples = request.samples or signal(request.excite, model.unit, model.period, request.seconds)
+        samples = request.samples or signal(request.excite or "", model.unit, model.period, request.seconds)
         law = excitation_law(samples, len(model.per_unit), model.period)
     references = _references(law, model) if request.law is not None else ()
     folder.mkdir(parents=True, exist_ok=True)

@@ -133,7 +133,7 @@ def load_study(
     folder = Path(data) if data is not None else path.parent
     logs = {(name, "", "", ""): record for name, record in (records or {}).items()}
     runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
-    hardware = read_hardware(study, plant, rig, [log.provenance.rig for log in logs.values()])
+    hardware = read_hardware(study, plant, rig, [log.provenance.rig or "" for log in logs.values()])
     rig = with_noise(rig, runs)
     if fixed is not None:
         levels = {n: p for n, p in rig.parameters.items() if n.startswith(NOISE)}
@@ -247,8 +247,8 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         record = record.replace(t=record.t - record.t[0])
     with run.at("file"):
         check_clock(record)
-    hash_of = record.provenance.sha256[:12]
-    notes: list[str] = [f"{Path(record.provenance.file).name}{f' (sha256 {hash_of})' if hash_of else ''}"]
+    hash_of = record.provenance.sha256
+    notes = [f"{Path(record.provenance.file or '').name}{f' (sha256 {hash_of[:12]})' if hash_of else ''}"]
     whole = float(record.t[0]), float(record.t[-1])
     if "window" in run:
         start, stop = _window(run, record)
@@ -313,7 +313,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         restart=_restart(run),
         score_from=_score_from(run, grid),
         loop=loop,
-        repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else "",
+        repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else None,
         source="; ".join(notes),
         record=whole,
     )

@@ -180,7 +180,7 @@ def _recovered(section: Section, scene: Scene) -> ClosedLoop:
             " or leave loop out and let the recorded command drive the plant",
         )  # fmt: skip
     law = recovery.law
-    every = matching(section, scene.period / law.period)
+    every = matching(section, scene.period / law.needed_period)
     factors = recovery.feedforward
     law = replace(
         law, B=np.column_stack([law.B, np.zeros((len(law.A), len(factors)))]),

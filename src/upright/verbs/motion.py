@@ -237,7 +237,7 @@ def _apart(one: Mapping[str, float], other: Mapping[str, float]) -> float:
 
 def _period(law: Any, dt: float | None) -> float:
     """Time between samples: the requested one, or the one that gains or a law are for."""
-    own = (law.period if isinstance(law, Gains | Law | Rule) else None) or None
+    own = law.period if isinstance(law, Gains | Law | Rule) else None
     if dt is not None and own is not None and not math.isclose(dt, own, rel_tol=1e-6):
         raise BadInput(
             f"these gains are for a period of {1e3 * own:.6g} ms, and dt is {1e3 * dt:.6g} ms; leave dt out, design "

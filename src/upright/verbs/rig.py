@@ -110,7 +110,7 @@ def run(
     leaning = _let_go(on.get("start"), path_of(rig, "the rig that runs"), law=law is not None)
     request = RunRequest(
         rig=path_of(rig, "the rig that runs"), law=None if law is None else path_of(law, "a law that runs"),
-        excite=excite or "", reference=on.get("reference") or "", seconds=duration, mode=on.get("mode") or "host",
+        excite=excite or None, reference=on.get("reference") or None, seconds=duration, mode=on.get("mode") or "host",
         tilt=leaning, check=check, watch=watch, accept=on.get("accept") or "",
     )  # fmt: skip
     result = run_rig(request, folder, watch=observe)

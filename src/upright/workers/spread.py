@@ -37,7 +37,7 @@ class Workers:
     """Who computes: this process, `number` processes of this machine, a Dask `cluster`, or an executor that is lent."""
 
     number: int = 1
-    cluster: str = ""
+    cluster: str | None = None
     executor: Executor | None = None
 
     @classmethod
@@ -62,7 +62,7 @@ class Workers:
     def __post_init__(self) -> None:
         if not 1 <= self.number <= MOST:
             raise BadInput(f"--workers takes a whole number from 1 to {MOST}, got {self.number}.")
-        if self.cluster and not re.fullmatch(r"(tcp|tls|ws|wss|ucx)://[^\s/]+:\d+", self.cluster):
+        if self.cluster is not None and not re.fullmatch(r"(tcp|tls|ws|wss|ucx)://[^\s/]+:\d+", self.cluster):
             raise BadInput(
                 "--workers takes a number of processes of this machine, or the address that `dask scheduler` prints, "
                 f"such as tcp://host:8786, got '{self.cluster:.60}'."
@@ -71,7 +71,7 @@ class Workers:
     @property
     def alone(self) -> bool:
         """Whether this process does everything itself."""
-        return self.number == 1 and not self.cluster and self.executor is None
+        return self.number == 1 and self.cluster is None and self.executor is None
 
 
 HERE = Workers()

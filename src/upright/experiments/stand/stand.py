@@ -193,4 +193,4 @@ class TestStand(ABC):
 
 def file_of(log: Record) -> str:
     """Name of the file that a stand left of a log."""
-    return Path(log.provenance.file).name
+    return Path(log.provenance.file or "").name

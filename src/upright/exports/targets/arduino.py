@@ -42,7 +42,7 @@ def sketch(made: SampledController) -> str:
     return filled(
         "law.ino.in",
         title=made.title,
-        period=round(1e6 * made.law.period),
+        period=round(1e6 * made.law.needed_period),
         steps=", ".join(
             f"LAW_STEP_{name.upper()}" if step else f"{_RESOLUTION:g} /* FILL IN: reading per count */"
             for name, step in zip(names, steps, strict=True)

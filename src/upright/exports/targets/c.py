@@ -39,7 +39,7 @@ def header(made: SampledController, *, single: bool) -> str:
     about = "\n".join(f"   {fact}" for fact in made.facts)
     return filled(
         "law.h.in", title=made.title, about=about, real="float" if single else "double",
-        period=constant(made.law.period, single), readings=len(made.readings), references=len(made.references),
+        period=constant(made.law.needed_period, single), readings=len(made.readings), references=len(made.references),
         commands=len(made.commands), steps=steps, memories=max(made.memories, 1), listed="; ".join(listed),
         progress="unsigned long samples" if isinstance(made.law, Rule) else "int running",
     )  # fmt: skip

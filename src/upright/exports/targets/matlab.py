@@ -70,7 +70,8 @@ def _s_function(made: SampledController, *, single: bool) -> str:
     return filled(
         "law_sfun.m.in", title=made.title, readings=", ".join(made.readings), commands=", ".join(made.commands),
         then="; then " + ", ".join(made.references) if m else "", ports=2 if m else 1, inputs=len(made.readings),
-        second=second, outputs=len(made.commands), period=f"{made.law.period:.17g}", kept=max(made.memories, 1) + 2,
+        second=second, outputs=len(made.commands), period=f"{made.law.needed_period:.17g}",
+        kept=max(made.memories, 1) + 2,
         r=", block.InputPort(2).Data" if m else "", number="single" if single else "double",
     )  # fmt: skip
 

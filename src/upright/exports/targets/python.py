@@ -48,7 +48,7 @@ def _files(made: SampledController, test: ReplayVector, single: bool) -> dict[st
     begin.append("self.stopped = False")
     rows = zip(test.readings.tolist(), test.references.tolist(), test.commands.tolist(), strict=True)
     return {"law.py": filled(
-        "law.py.in", title=made.title, about="\n".join(made.facts), needs=needs, period=repr(made.law.period),
+        "law.py.in", title=made.title, about="\n".join(made.facts), needs=needs, period=repr(made.law.needed_period),
         readings=repr(made.readings), references=repr(made.references), commands=repr(made.commands), before=before,
         first=indented(begin, 8), body=indented(lines, 8), table=indented(f"({y}, {r}, {u})," for y, r, u in rows),
     )}  # fmt: skip

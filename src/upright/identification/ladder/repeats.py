@@ -64,7 +64,7 @@ def repeats(runs: Sequence[Run]) -> tuple[Repeats, ...]:
 
 def same(a: Run, b: Run) -> bool:
     """Whether one run repeats the other."""
-    if a.repeats or b.repeats:
+    if a.repeats is not None or b.repeats is not None:
         return a.repeats == b.repeats and a.measured == b.measured and _rhythm(a, b)
     if a.measured != b.measured or not _rhythm(a, b) or a.known != b.known or set(a.held) != set(b.held):
         return False

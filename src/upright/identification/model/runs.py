@@ -53,7 +53,7 @@ class Run:
     measured : tuple of str
         Names of the coordinates in the columns of `y`.
     resolution : tuple of float
-        Resolution of each column of `y` [SI], 0 when continuous.
+        Resolution of each column of `y` [SI], 0 when continuous, as all are when None.
     held : mapping of str to (N,) array or float
         Coordinates that did not move freely: their measured motion, or the constant they were locked at.
     known : mapping of str to float
@@ -92,7 +92,7 @@ class Run:
     u: Array
     y: Array
     measured: tuple[str, ...]
-    resolution: tuple[float, ...] = ()
+    resolution: tuple[float, ...] | None = None
     held: Mapping[str, Array | float] = field(default_factory=dict[str, "Array | float"])
     known: Mapping[str, float] = field(default_factory=dict[str, float])
     unknown: tuple[str, ...] = ("initial",)
@@ -104,7 +104,7 @@ class Run:
     restart: Literal["smooth", "kalman"] = "smooth"
     score_from: float = 0.0
     loop: ClosedLoop | None = None
-    repeats: str = ""
+    repeats: str | None = None
     source: str = ""
     record: tuple[float, float] | None = None
 

@@ -64,7 +64,7 @@ class ChainStarts:
     `numbers` by the plant's own names; `braked` [force per speed]: damping that acts with the volts on alone, 0 when
     they never go off; `trips`: whether the drive went off although it is logged as on; `limit`: of the command, 0 where
     it stays within reach; `fastest`: angular frequency [rad/s] of the fastest swing; `grounded`: where the last body
-    rests beside its neighbour under a constant command, 0 where it does not lag behind.
+    rests beside its neighbour under a constant command, None where it does not lag behind.
     """
 
     numbers: dict[str, float]
@@ -72,7 +72,7 @@ class ChainStarts:
     trips: bool
     limit: float
     fastest: float
-    grounded: float = 0.0
+    grounded: float | None = None
 
 
 def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[Recognised, list[TomlTable]]:
@@ -82,7 +82,7 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[
     several = len(log.windows) > 1
     runs = [(f"{label} {i + 1}" if several else label, a, b, "fit") for i, (a, b) in enumerate(log.windows)]
     doubts = implausible(plant, start.numbers, scaled_by="the assumed 1 N (N m) per volt")
-    if start.grounded:
+    if start.grounded is not None:
         doubts.append(
             f"Under a constant command the last body rests at {start.grounded:.2f} of its neighbour's place: a spring"
             " to ground is estimated for it."
@@ -311,8 +311,8 @@ def starts(
         for name in columns.keys() & frozenset(plant.names()) - numbers.keys():
             numbers[name] = inertia * (max(slope[name], least[name]) if name in least else
                                        slope[name] if slope[name] > 0 else w**2)  # fmt: skip
-    grounded = _lags_behind(command, bodies, quanta) if len(bodies) > 1 and free[-1] and free[-2] else 0.0
-    if grounded:  # k_12 (x_1 - x_2) = k_2 x_2
+    grounded = _lags_behind(command, bodies, quanta) if len(bodies) > 1 and free[-1] and free[-2] else None
+    if grounded is not None:  # k_12 (x_1 - x_2) = k_2 x_2
         last = len(bodies)
         numbers[f"k_{last}"] = numbers[f"k_{last - 1}{last}"] * (1 / grounded - 1)
     trips = False
@@ -336,8 +336,8 @@ def _sought(plant: type[Plant], free: list[bool]) -> frozenset[str]:
     return frozenset(inertias | dashpots | springs | ({"k_1"} if grounded else set()))
 
 
-def _lags_behind(u: Array, bodies: list[Array], quanta: list[float]) -> float:
-    """Share of its neighbour's displacement at which the last body rests under a constant command; 0 for all of it.
+def _lags_behind(u: Array, bodies: list[Array], quanta: list[float]) -> float | None:
+    """Share of its neighbour's displacement at which the last body rests under a constant command; None for all of it.
 
     Springs between bodies alone take all of them equally far; one to ground holds the last one back.
     """
@@ -353,8 +353,8 @@ def _lags_behind(u: Array, bodies: list[Array], quanta: list[float]) -> float:
         away = abs(float(np.median(near))) > max(FAR * quanta[-2], 0.1 * float(np.ptp(bodies[-2])))
         if u[start] != 0 and still and away:
             share = float(np.median(far) / np.median(near))
-            return share if 0.05 < share < LAGS else 0.0
-    return 0.0
+            return share if 0.05 < share < LAGS else None
+    return None
 
 
 def _frequency(t: Array, bodies: list[Array], free: list[bool]) -> float:

@@ -26,7 +26,7 @@ def plants_that_suit(record: Record, inspection: Inspection) -> tuple[str, ...]:
         places = places[:MOST_BODIES]
         first = record[places[0].name]
         against = drive is not None and moves_against(record.t, record[drive.name], first)
-        kind, _ = chain_kind(record, places, drive, against, record.provenance.file)
+        kind, _ = chain_kind(record, places, drive, against, record.provenance.file or "")
         likely = f"{kind}-{len(places)}"
     units = [c.guess for c in places]
     lengths, angles = sum(u in LENGTHS for u in units), sum(u in ANGLES for u in units)

@@ -121,7 +121,7 @@ def design(
         raise BadInput("design takes a fit.json, its folder, a study or a linear model, or --matrices FILE; give one.")
     request = DesignRequest(
         at="", poles=requested, weights=weights, R=on.get("effort_weight"), delay=on.get("delay"),
-        lag=si_if_given(on.get("lag"), "s"), memory=on.get("memory", 0.5), track=on.get("track") or "",
+        lag=si_if_given(on.get("lag"), "s"), memory=on.get("memory", 0.5), track=on.get("track") or None,
         sampled=on.get("sampled") or False,
     )  # fmt: skip
     if matrices is not None or is_linear(source):
