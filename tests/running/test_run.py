@@ -124,9 +124,9 @@ def test_a_reference_is_in_the_log_with_its_unit_and_a_law_without_one_has_no_co
     assert up.read(str(done.log_path)).units["reference"] == "rad"
     up.log_convert(done.log_path, out=tmp_path / "run.csv")
     assert np.array_equal(up.read(str(tmp_path / "run.csv"))["reference"], done.log.columns["reference"])
-    plain = run_rig(replace(wish, reference="", tilt=0.02), tmp_path)
+    plain = run_rig(replace(wish, reference=None, tilt=0.02), tmp_path)
     assert "reference" not in plain.log.columns
-    assert "excitation" not in run_rig(replace(wish, law=None, reference="", excite="free"), tmp_path).log.columns
+    assert "excitation" not in run_rig(replace(wish, law=None, reference=None, excite="free"), tmp_path).log.columns
 
 
 @pytest.mark.slow

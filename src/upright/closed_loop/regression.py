@@ -233,7 +233,7 @@ def channels_of(best: Regression, measured: Sequence[str], references: Sequence[
         kd = gains.get(("kd", i), 0.0) + second
         channel = Channel(
             measured=name,
-            reference=references[i] if i < len(references) else "",
+            reference=references[i] if i < len(references) else None,
             kp=gains.get(("kp", i), 0.0),
             ki=gains.get(("ki", i), 0.0),
             kd=kd,

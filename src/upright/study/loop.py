@@ -127,7 +127,7 @@ def _pid(section: Section, scene: Scene) -> ClosedLoop:
         reference_of(r, "1" if raw else coordinates[n], section, scene) for r, n in zip(entries, measured, strict=False)
     ]
     channels = [
-        Channel(measured=n, reference=f"reference {i + 1}" if i < len(entries) else "", kp=gains["kp"][i],
+        Channel(measured=n, reference=f"reference {i + 1}" if i < len(entries) else None, kp=gains["kp"][i],
                 ki=gains["ki"][i], kd=gains["kd"][i], on=on, filter=smooth)
         for i, n in enumerate(measured)
     ]  # fmt: skip

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import signature
-from numbers import Integral, Real
+from numbers import Complex, Integral, Real
 from typing import Any, TypeVar
 
 from upright.errors import BadInput, UprightError
 from upright.verbs.command import Command, command_of
+from upright.verbs.options import Counts, shared_parameters
+from upright.verbs.values import Start
 
 V = TypeVar("V", bound=Callable[..., Any])
 
@@ -26,8 +28,11 @@ _KINDS: dict[str, tuple[tuple[type, ...], str]] = {
     "str": ((str, os.PathLike), "a text"),
     "int": ((Integral,), "a whole number"),
     "float": ((Real,), "a number"),
+    "complex": ((Complex,), "a number"),
+    "None": ((type(None),), "None"),
 }
 """What an annotation means: the types of its values, and how a sentence calls them."""
+_ALIASES = {"Counts": Counts, "Start": Start}
 
 
 def worded_for_python(verb: V) -> V:
@@ -52,15 +57,73 @@ def _check_kinds(verb: Callable[..., Any], args: tuple[Any, ...], words: dict[st
         given = stated.bind_partial(*args, **words).arguments
     except TypeError:
         return  # Python's own sentence names what is missing or too much
+    kinds = {name: str(p.annotation) for name, p in stated.parameters.items()}
+    for p in stated.parameters.values():
+        if p.kind is p.VAR_KEYWORD:
+            shared = shared_parameters(p, verb.__module__)[0]
+            given |= given.pop(p.name, {})
+            kinds |= {name: f"{option.annotation} | None" for name, option in shared.items()}
     for name, value in given.items():
-        kind, _, absent = str(stated.parameters[name].annotation).partition(" | ")
-        if absent not in ("", "None") or (absent and value is None):
-            continue
-        if kind == "bool" and not (isinstance(value, bool) or type(value).__name__ == "bool"):  # NumPy's too
-            raise BadInput(f"{name} is True or False, got {value!r:.60}.")
-        types, needed = _KINDS.get(kind, ((object,), ""))
-        if not isinstance(value, types) or (isinstance(value, bool) and kind in ("int", "float")):
-            raise BadInput(f"{name} takes {needed}{' or None' * bool(absent)}, got {value!r:.60}.")
+        kind = kinds.get(name, "Any")
+        if not _fits(value, kind):
+            *others, last = dict.fromkeys(_called(k) for k in _alternatives(kind))
+            needed = f"{', '.join(others)} or {last}" if others else last
+            raise BadInput(f"{name} takes {needed}, got {value!r:.60}.")
+
+
+def _alternatives(annotation: str) -> list[str]:
+    """The kinds of ``A | B[C | D]``, aliases of the verbs' own resolved; NumPy's and those of rooms below stay."""
+    kinds, depth = [""], 0
+    for letter in annotation:
+        depth += (letter == "[") - (letter == "]")
+        if letter == "|" and depth == 0:
+            kinds.append("")
+        else:
+            kinds[-1] += letter
+    stripped = [kind.strip() for kind in kinds]
+    return [k for s in stripped for k in (_alternatives(_text_of(_ALIASES[s])) if s in _ALIASES else [s])]
+
+
+def _text_of(alias: Any) -> str:
+    return str(alias).replace("collections.abc.", "").replace("typing.", "")
+
+
+def _fits(value: Any, annotation: str) -> bool:
+    """Whether a value is of an annotation's kind; one of a kind that this module does not know is let through."""
+    return any(_fits_one(value, kind) for kind in _alternatives(annotation))
+
+
+def _fits_one(value: Any, kind: str) -> bool:
+    name, _, inside = kind.partition("[")
+    if name == "bool":
+        return isinstance(value, bool) or type(value).__name__ == "bool"  # NumPy's too
+    if name in _KINDS:
+        return isinstance(value, _KINDS[name][0]) and not (isinstance(value, bool) and name != "None")
+    of = inside.removesuffix("]")
+    if name == "Mapping":
+        each = of.partition(", ")[2]
+        return issubclass(type(value), Mapping) and all(isinstance(k, str) and _fits(v, each) for k, v in value.items())
+    if name in ("Sequence", "Iterable", "tuple"):
+        each, length = of.partition(", ")[0], of.count(", ") + 1
+        if isinstance(value, str | bytes | Mapping) or not hasattr(value, "__iter__") or isinstance(value, type):
+            return False
+        if getattr(value, "ndim", 1) == 0:
+            return False
+        if not hasattr(value, "__len__"):
+            return name == "Iterable"
+        return (name != "tuple" or len(value) == length) and all(_fits(v, each) for v in value)
+    return True
+
+
+def _called(kind: str) -> str:
+    """How a sentence calls a kind."""
+    name, _, inside = kind.partition("[")
+    if name == "Mapping":
+        return "values by name"
+    if name in ("Sequence", "Iterable", "tuple"):
+        many = "two" if name == "tuple" else "several"
+        return f"{many} {'texts' if inside.startswith('str') else 'numbers'}"
+    return "True or False" if name == "bool" else _KINDS[name][1]
 
 
 def worded(sentence: str, command: Command) -> str:

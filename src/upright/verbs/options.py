@@ -202,7 +202,7 @@ def shared_parameters(verb: Parameter, module: str) -> tuple[dict[str, Parameter
 
 
 def known_options(kind: type[Options], options: Mapping[str, Any], verb: str) -> Options:
-    """The options that were given.
+    """The options that were given, arrays and numbers of NumPy as Python's.
 
     Raises
     ------
@@ -212,6 +212,7 @@ def known_options(kind: type[Options], options: Mapping[str, Any], verb: str) ->
     for name in options:
         if name not in kind.__annotations__:
             raise BadInput(f"{verb} has no option '{name}'; {nearest(name, kind.__annotations__)}")
+    options = {n: v.tolist() if hasattr(v, "tolist") else v for n, v in options.items()}
     empty = {n for n, v in options.items() if v is None or (isinstance(v, str | list | tuple | dict) and not v)}
     return cast("Options", {n: v for n, v in options.items() if n not in empty})
 

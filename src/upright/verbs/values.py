@@ -140,7 +140,10 @@ def read_pole_list(value: str | Iterable[complex] | None) -> NDArray[np.complex1
         return read_poles(value) if value else None
     import numpy as np
 
-    poles = np.atleast_1d(np.asarray(value, dtype=np.complex128)).ravel()
+    try:
+        poles = np.atleast_1d(np.asarray(value, dtype=np.complex128)).ravel()
+    except (TypeError, ValueError):
+        raise BadInput(f'poles are numbers [1/s] or a text such as "-4+-2j, -10", got {value!r:.60}.') from None
     return poles if poles.size else None
 
 
@@ -169,7 +172,7 @@ def texts(value: Sequence[str] | str | None) -> tuple[str, ...]:
         return (value,) if value else ()
     if value is not None and not isinstance(value, Iterable):  # type: ignore[reportUnnecessaryIsInstance]
         raise BadInput(f"a text or several were needed, got {value!r:.40}.")
-    return tuple(value or ())
+    return () if value is None else tuple(value)
 
 
 def path_of(value: Any, what: str) -> Path:

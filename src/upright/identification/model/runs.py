@@ -53,7 +53,7 @@ class Run:
     measured : tuple of str
         Names of the coordinates in the columns of `y`.
     resolution : tuple of float
-        Resolution of each column of `y` [SI], 0 when continuous, as all are when None.
+        Resolution of each column of `y` [SI], 0 when continuous.
     held : mapping of str to (N,) array or float
         Coordinates that did not move freely: their measured motion, or the constant they were locked at.
     known : mapping of str to float
@@ -92,7 +92,7 @@ class Run:
     u: Array
     y: Array
     measured: tuple[str, ...]
-    resolution: tuple[float, ...] | None = None
+    resolution: tuple[float, ...] = ()
     held: Mapping[str, Array | float] = field(default_factory=dict[str, "Array | float"])
     known: Mapping[str, float] = field(default_factory=dict[str, float])
     unknown: tuple[str, ...] = ("initial",)

@@ -192,7 +192,7 @@ def _sampling(model: StateSpace, period: float | str | None) -> float:
 
 
 def _numbers(text: str | Iterable[float] | None) -> tuple[float, ...] | None:
-    if text is None or text == "":
+    if text is None or (isinstance(text, str) and not text):
         return None
     if not isinstance(text, str):
         return tuple(float(x) for x in text) or None
@@ -202,9 +202,9 @@ def _numbers(text: str | Iterable[float] | None) -> tuple[float, ...] | None:
         raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
 
 
-def _start(rig: Rig | StateSpace, start: Start | None) -> tuple[float, ...]:
-    """Deviation, state by state in its unit; empty when none was given."""
+def _start(rig: Rig | StateSpace, start: Start | None) -> tuple[float, ...] | None:
+    """Deviation, state by state in its unit, where one was given."""
     states = read_start(start, rig.states, rig.state_units)
     if states and not any(states.values()):
         raise BadInput("--start must leave the equilibrium; give one state a value that is not 0.")
-    return tuple(states.get(name, 0.0) for name in rig.states) if states else ()
+    return tuple(states.get(name, 0.0) for name in rig.states) if states else None

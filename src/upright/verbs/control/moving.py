@@ -44,7 +44,7 @@ def played(
         raise BadInput(f"rigs in a page run more than 0 and at most 20 s, got {seconds:g} s.")
     if not 1 <= draws <= 1000:
         raise BadInput(f"a page holds 1 to 1000 rigs, got {draws}.")
-    if (on.get("speed") or "filtered") == "kalman":
+    if (on.get("speed") or "filtered") not in ("plain", "filtered"):
         raise BadInput("in a page velocities come from plain or filtered differences; leave speed out.")
     if (lacks := unplayable(known)) is not None:
         raise BadInput(f"play needs {lacks}.")

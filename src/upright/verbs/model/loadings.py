@@ -168,7 +168,7 @@ def plan_inertias(
         if not 2 <= value <= most:
             raise BadInput(f"{option} needs a whole number from 2 to {most}, got {value}.")
     body = BODIES[rig]
-    choice = choices(rig, [si(r, "m") for r in paths(radius) if r != ""])
+    choice = choices(rig, [si(r, "m") for r in paths(radius) if not (isinstance(r, str) and not r)])
     bare_inertia = si_if_given(bare, body.unit)
     m_0 = body.rig.plant.parameters()[body.inertia] if bare_inertia is None else bare_inertia
     piece = min(w.added for w in choice if w.added > 0)
