@@ -146,7 +146,7 @@ def test_without_a_start_the_last_body_is_off_by_five_degrees_or_centimetres_and
     assert done.peak == pytest.approx(np.abs(u).max())
 
 
-@pytest.mark.parametrize("track", ["psi", ""])
+@pytest.mark.parametrize("track", ["psi", None])
 def test_a_law_that_tracks_comes_to_its_reference_and_another_has_none(track):
     """psi upright has a pole at 0: u = 0 at rest, so k_pf times the reference is the gain of psi times psi."""
     done = design_for(ARM, DesignRequest(at="inverted", poles=(-4.0, -5.0, -16.0, -3.0), period=2e-3, track=track))

@@ -229,17 +229,17 @@ class Record(Shown):
         try:
             about = json.loads(description) if description else {}
             source: dict[str, Any] = dict(about.get("provenance", {}))
-            start, stop = source.pop("window", None) or (None, None)
+            ends = source.pop("window", None) or None
             notes = tuple(str(v) for v in source.pop("notes", ()))
             units: dict[str, str] = {str(k): str(v) for k, v in dict(about.get("units", {})).items() if k in signals}
             units |= {k: v for k, v in (stated or {}).items() if v}
             # columns may have been dropped since the description was written
             inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
             outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
-            window = None if start is None else (float(start), float(stop))
+            window = None if ends is None else (float(ends[0]), float(ends[1]))
             texts = {k: str(v) for k, v in source.items() if v}  # files of before 1.0 say "" where nobody said
             provenance = Provenance(**texts, window=window, notes=notes)
-        except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        except (ValueError, TypeError, AttributeError, IndexError, KeyError, RecursionError) as error:
             raise BadInput(
                 f"The description of the record must be the JSON this package wrote, got {description[:60]!r}"
                 f" ({error}); write the file again or remove the description."
