@@ -164,7 +164,7 @@ def test_a_law_that_cannot_be_is_refused(changed, words):
 
 
 def test_what_is_at_a_bound_is_a_law():
-    assert some(delay=0.0, resolution=0.0).period is None
+    assert some(delay=0.0, resolution=0.0, period=None).period is None
     assert some(references=None).signal().shape == (1, 1)
     assert some(references=None).readings == 2
     assert some(references=[1.0, 2.0]).signal().tolist() == [[1.0], [2.0]]
