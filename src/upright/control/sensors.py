@@ -148,7 +148,7 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
     p, m, command = len(names), size.size, log["u"]
     drift = np.linspace(0.0, 1.0, len(shown))[:, None] ** np.arange(1, 4)
     z, step, J = np.zeros(m), 0.3, np.zeros((0, 0))
-    s, wander, at = np.ones(p), np.zeros(3), shown
+    s, wander, at, sigma = np.ones(p), np.zeros(3), shown, np.full(p, np.inf)
     part = math.ceil(0.4 * len(shown))
     for turn in range(12):  # first the beginning, then all: errors of the model grow with time
         y = _motion(model, command, every, moving, np.vstack([z, z + step * np.eye(m)]) * size)
@@ -159,8 +159,9 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
         left[:, 0] -= drift @ wander
         left[part:] = 0.0
         quarters = max(8.0, 2.0 * float(np.sum(np.diff(np.sign(at[:, 1])) != 0)))
-        sigma = np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.resolution) * math.sqrt(
-            len(shown) / quarters
+        before, sigma = (
+            sigma,
+            np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.resolution) * math.sqrt(len(shown) / quarters),
         )
         # unknown: scales, drift of the driven body, numbers of the model in units of what is known of them
         J = np.zeros((p * len(shown) + m, p + 3 + m))
@@ -172,7 +173,7 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
         J[p * len(shown) :, p + 3 :] = np.eye(m)
         move = np.linalg.lstsq(J, np.concatenate([*(left / sigma).T, -z]), rcond=None)[0]
         s, wander, z = s + move[:p], wander + move[p : p + 3], np.clip(z + move[p + 3 :], -4.0, 4.0)
-        if part == len(shown) and np.abs(move[p + 3 :]).max() < 1e-2:
+        if part == len(shown) and np.abs(move[p + 3 :]).max() < 1e-2 and np.abs(sigma / before - 1.0).max() < 0.05:
             break
         if turn >= 4 or np.abs(move[p + 3 :]).max() < 0.1:
             part = len(shown)
