@@ -67,13 +67,13 @@ class RunRequest:
     own_process: bool = False
 
     def __post_init__(self) -> None:
-        if (self.law is None) == (self.excite is None and self.samples is None and self.exploration is None):
+        if (self.law is None) == (not self.excite and not self.samples and self.exploration is None):
             raise BadInput('A run needs either a law (--law design.json) or a signal (--excite "sine 0.5 2").')
         if not 0 < self.seconds <= 86_400:
             raise BadInput(f"a run takes more than 0 and at most 86400 s, got {self.seconds:g} s.")
         if self.mode not in MODES:
             raise BadInput(f"--mode is host or mcu, got '{self.mode}'.")
-        if self.reference is not None and self.law is None:
+        if self.reference and self.law is None:
             raise BadInput("a reference is for a law; a signal that is put out blindly is --excite.")
 
 
