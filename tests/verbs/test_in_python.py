@@ -105,3 +105,9 @@ def test_what_numpy_counts_and_asks_counts_too(tmp_path):
     model = up.StateSpace(A, B, np.eye(2))
     assert up.hold(model, np.float32(0.5), delay=np.float64(0.0)).dt == 0.5
     assert up.chain(np.int64(2)) is up.chain(2)
+
+
+@pytest.mark.parametrize("verb", ["from_matlab", "from_mjcf", "read", "identify", "log_show"])
+def test_a_file_that_is_missing_is_named_in_a_sentence(tmp_path, verb):
+    with pytest.raises(BadInput, match=r"There is no (file|study) '.*nowhere\.x'"):
+        getattr(up, verb)(tmp_path / "nowhere.x")

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import signature
 from numbers import Complex, Integral, Real
+from pathlib import Path
 from typing import Any, TypeVar
 
 from upright.errors import BadInput, UprightError
@@ -47,6 +48,12 @@ def worded_for_python(verb: V) -> V:
             command = command_of(verb)
             error.args = tuple(worded(a, command) if isinstance(a, str) else a for a in error.args)
             raise
+        except FileNotFoundError as error:
+            from upright.readers.source import neighbour
+
+            if error.filename is None:
+                raise
+            raise BadInput(f"There is no file '{error.filename}';{neighbour(Path(error.filename))}") from None
 
     return called  # type: ignore[return-value]
 
