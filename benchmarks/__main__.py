@@ -113,7 +113,7 @@ def main(arguments: list[str] | None = None) -> int:
         metavar="N",
         help=f"processes for {', '.join(SHARED)}; default 1, for mutants 2",
     )
-    parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="Dask scheduler for them, tcp://host:8786")
     changes = parser.add_argument_group("mutants")
     changes.add_argument("--sample", type=int, default=150, metavar="N", help="changes of the code; default 150")
     changes.add_argument("--seed", type=int, default=0, metavar="N", help="which ones; default 0")

@@ -104,10 +104,10 @@ def test_a_swing_up_of_a_fit_meets_the_numbers_it_was_made_from_where_nothing_sa
 @pytest.mark.parametrize(
     ("fault", "scales"),
     [({"theta": 0.5}, (1.0, 0.5)), (" psi = -4 ", (-4.0, 1.0)), ({"psi": 100, "theta": 0.01}, (100.0, 0.01)),
-     (None, ()), ("", ()), ({}, ())],
+     (None, None), ("", None), ({}, None)],
 )  # fmt: skip
 def test_a_faulty_encoder_shows_its_multiple_and_the_others_what_is_true(fault, scales):
-    assert tuple(_faulty(make_rig("furuta"), fault).scales) == scales
+    assert _faulty(make_rig("furuta"), fault).scales == scales
 
 
 @pytest.mark.parametrize("fault", ["theta=0.009", "theta=101", "theta=x", "theta", {"theta": -0.001}])

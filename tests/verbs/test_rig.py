@@ -65,7 +65,7 @@ def test_a_run_is_asked_for_what_was_typed_and_its_page_lies_beside_its_log(rig,
     done = run(path, law=tmp_path / "law.json", duration=7.0, check=False, watch=False, out=tmp_path / "out",
                start="2 deg", reference="step 0.1", mode="mcu", accept="so")  # fmt: skip
     ((request, folder, _),) = asked
-    assert (request.rig, request.law, request.excite, folder) == (path, tmp_path / "law.json", "", tmp_path / "out")
+    assert (request.rig, request.law, request.excite, folder) == (path, tmp_path / "law.json", None, tmp_path / "out")
     assert (request.seconds, request.check, request.watch, request.mode) == (7.0, False, False, "mcu")
     assert (request.tilt, request.reference, request.accept) == (pytest.approx(math.radians(2)), "step 0.1", "so")
     assert [f.name for f in done.files] == ["run-2.mcap", "run-2.html"]

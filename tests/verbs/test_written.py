@@ -1,10 +1,13 @@
 """Does a verb in Python leave files only where it was told to?"""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import upright as up
 from tests.logs.runs import written
+from upright.verbs.command import command_of
 
 ARM = up.Furuta(m_p=0.135, l_cg=0.19, r=0.16, J_d=0.011, J_p=6e-4, b_1=6e-3, b_2=2e-4)
 RIG = up.Rig.known(ARM, gain="0.65 N m/V", limit="10 V", period="2 ms", counts=4096, travel="200 deg")
@@ -116,3 +119,17 @@ def test_what_cannot_be_but_a_file_asks_for_its_folder(verb, tmp_path, monkeypat
     with pytest.raises(up.BadInput, match="name a folder for it, such as out="):
         getattr(up, verb)(*(["RIG.toml"] if verb == "run" else []))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("typed", "folder"),
+    [
+        ({}, "upright-lab"), ({"rig": "furuta", "seed": 3}, "upright-lab-furuta-3"),
+        ({"nonideal": True}, "upright-lab-nonideal"), ({"rig": "rigs/RIG.toml"}, "upright-lab-RIG"),
+        ({"rig": "serial:COM3"}, "."),
+    ],
+)  # fmt: skip
+def test_the_folder_of_a_laboratory_is_named_as_its_help_says(typed, folder):
+    """What is not typed is None; a board's files stand where one is."""
+    before = {"rig": None, "seed": None, "nonideal": None, "out": None, "ask": 1, "watching": 1}
+    assert command_of(up.lab).prepare(before | typed)["out"] == Path(folder)

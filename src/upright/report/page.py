@@ -103,6 +103,8 @@ class Picture:
         Gives the matplotlib figure or the chart when somebody looks; or its markup.
     interactive : callable or str
         Gives what a page on a screen draws in its place, from `report.interactive`; nothing when empty.
+    phone : str
+        Markup of the drawing for a phone, beside a `draw` that is markup.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Picture:
     caption: str
     description: str
     interactive: Callable[[], str] | str = ""
+    phone: str = ""
 
     @cached_property
     def answers(self) -> str:
@@ -146,7 +149,7 @@ class Picture:
     def narrow(self) -> str:
         """Markup of the drawing for a phone; "" where the drawing, or what answers, fits, or where it is large."""
         if isinstance(self.draw, str) or self.answers:
-            return ""
+            return self.phone
         from upright.report.drawing import narrowed, svg
 
         drawn = self.draw()
@@ -434,7 +437,7 @@ def as_plain(value: Any, instead: Callable[[Any], Any] = lambda value: None) -> 
     if isinstance(value, Symbol):
         return {"kind": "Symbol", "text": str(value)}
     if isinstance(value, Picture):
-        value = replace(value, draw=value.svg, interactive=value.answers)
+        value = replace(value, draw=value.svg, interactive=value.answers, phone=value.narrow)
     if isinstance(value, Mapping):
         return plain_values(value)
     if is_dataclass(value):

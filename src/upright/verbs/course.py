@@ -68,7 +68,7 @@ def _typed(typed: dict[str, Any]) -> dict[str, Any]:
     """A folder of its own for each rig; a twin asks nobody for anything, and its runs are not watched."""
     rig = typed["rig"] or ""
     if typed["out"] is None:
-        of = (Path(rig).stem, str(typed["seed"] or ""), "nonideal" * typed["nonideal"])
+        of = (Path(rig).stem, str(typed["seed"] or ""), "nonideal" if typed["nonideal"] else "")
         typed["out"] = Path("-".join(["upright-lab", *filter(None, of)])) if not _is_port(rig) else Path()
     return typed if rig.endswith(".toml") else {**typed, "ask": None, "watching": None}
 
