@@ -196,14 +196,14 @@ def _ranked(problem: Problem, candidates: Sequence[Array], h: float) -> list[Arr
     return [x for _, _, x in costs]
 
 
-ATTEMPTS = (6, 20)
+ATTEMPTS = (8, 26)
 """Descents in a row from around an optimum that find no lower one, at least and at most, before it counts as the
 lowest; more than the least only as long as they are cheap, see `CHEAP`. A good fit (below `GOOD`) needs none."""
 
 FEW = (2, 6)
 """The same where the search began at an optimum of nearly the same runs."""
 
-CHEAP = 8e7
+CHEAP = 1.5e8
 """Simulated numbers, perturbed lanes counted, that cost a few seconds."""
 
 GOOD = 4e-4
@@ -221,9 +221,10 @@ def explains_little(problem: Problem, end: Descent) -> bool:
 AWAY = (1.0, 3.0)
 """How many standard errors every number is moved by, to either side, each in turn with"""
 
-SHARE = 0.6
-"""this share of every number that all runs share, normally distributed: of 20 descents of carts that stick two ended
-below the lowest optimum known, of 20 from 40 % to either side none."""
+NEARER, FARTHER = 0.4, 0.6
+"""these shares of every number that all runs share, to either side and normally distributed: of 20 descents of carts
+that stick two of the latter ended below the lowest optimum known, of the former none; a pair of disks is found by the
+former alone."""
 
 
 def other_valleys(
@@ -238,14 +239,17 @@ def other_valleys(
         return end
     if end.interrupted or end.normal.cost <= GOOD * problem.count():
         return end
-    rng = np.random.default_rng(seed)
+    rng, scatter = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     sigma, failed = _errors(problem, end), 0
     shares = [1.0 if u.log else max(abs(v), u.scale) for u, v in zip(problem.unknowns, end.x, strict=True)]
-    far = SHARE * np.array([s if u.shared else 0.0 for u, s in zip(problem.unknowns, shares, strict=True)])
+    far = np.array([s if u.shared else 0.0 for u, s in zip(problem.unknowns, shares, strict=True)])
     begun, lanes = problem.evaluations, problem.count() / len(problem.tracks) * (end.x.size + 1)
     while failed < attempts[0] or (failed < attempts[1] and (problem.evaluations - begun) * lanes < CHEAP):
-        signs, normal = rng.choice([-1.0, 1.0], end.x.size), rng.normal(size=end.x.size)
-        away = (AWAY[0] * sigma * signs, far * normal, AWAY[1] * sigma * signs, far * normal)[failed % 4]
+        if failed % 4 == 3:
+            away = FARTHER * far * scatter.normal(size=end.x.size)
+        else:
+            size = (*(n * sigma for n in AWAY), NEARER * far)[failed % 4]
+            away = size * rng.choice([-1.0, 1.0], end.x.size)
         x = np.clip(end.x + away, problem.lower, problem.upper)
         other = _from(problem, x, end)
         failed += 1
@@ -271,19 +275,13 @@ by how far it still is from there, within this share."""
 
 
 def _from(problem: Problem, x: Array, known: Descent) -> Descent:
-    """Where a descent ends; given up early where it only returns to an optimum that is `known`, or ends above.
-
-    It ends above where as much as its last leg gained, leg after leg, would not bring it below.
-    """
+    """Where a descent ends; given up early where it only returns to an optimum that is `known`, or ends far above."""
     end = descend(problem.normal, x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG)
-    before = math.inf
-    for left in range(60 // LEG, 0, -1):
+    for _ in range(60 // LEG):
         cost, away = end.normal.cost, end.x - known.x
         back = away @ known.normal.matrix @ away <= ARRIVED * known.normal.cost and cost >= known.normal.cost
-        above = cost - left * (before - cost) > known.normal.cost
-        if end.converged or end.interrupted or back or above or not cost < HOPELESS * known.normal.cost:
+        if end.converged or end.interrupted or back or not cost < HOPELESS * known.normal.cost:
             break
-        before = cost
         end = descend(problem.normal, end.x, problem.lower, problem.upper, tolerance=1e-6, limit=LEG, here=end.normal)
     return end
 
