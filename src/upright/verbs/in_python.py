@@ -76,6 +76,8 @@ def _check_kinds(verb: Callable[..., Any], args: tuple[Any, ...], words: dict[st
             *others, last = dict.fromkeys(_called(k) for k in _alternatives(kind))
             needed = f"{', '.join(others)} or {last}" if others else last
             raise BadInput(f"{name} takes {needed}, got {value!r:.60}.")
+        if name == "seed" and isinstance(value, Integral) and value < 0:
+            raise BadInput(f"seed takes a whole number of at least 0, got {value}.")
 
 
 def _alternatives(annotation: str) -> list[str]:

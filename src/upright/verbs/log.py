@@ -489,7 +489,7 @@ def law(
     if every is not None and every < 1:
         raise BadInput(f"--every needs a whole number of at least 1, got {every}.")
     record, path = open_log(log)
-    if not command or not measured:
+    if not command or not texts(measured):
         raise BadInput(
             f"{path.name} holds the columns {', '.join(record.names)}; say which one the law put out (--command) and"
             " which it read (--measured, and --reference if it followed one)."

@@ -194,12 +194,11 @@ def _sampling(model: StateSpace, period: float | str | None) -> float:
 def _numbers(text: str | Iterable[float] | None) -> tuple[float, ...] | None:
     if text is None or (isinstance(text, str) and not text):
         return None
-    if not isinstance(text, str):
-        return tuple(float(x) for x in text) or None
+    parts = text.split(",") if isinstance(text, str) else text
     try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text[:60]!r}.') from None
+        return tuple(float(part) for part in parts) or None
+    except (TypeError, ValueError):
+        raise BadInput(f'weights are numbers separated by commas, as in "1,0,1,0", got {text!r:.60}.') from None
 
 
 def _start(rig: Rig | StateSpace, start: Start | None) -> tuple[float, ...] | None:

@@ -419,7 +419,10 @@ def _row_of_gains(K: Any) -> Array:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", np.exceptions.ComplexWarning)
-            return np.atleast_2d(np.asarray(K, dtype=np.float64))
+            gains = np.atleast_2d(np.asarray(K, dtype=np.float64))
+        if not np.isfinite(gains).all():
+            raise ValueError
+        return gains
     except (TypeError, ValueError, np.exceptions.ComplexWarning):
         raise BadInput(f"K holds the gains of u = -K x, real numbers, one for each state, got {K!r:.40}.") from None
 

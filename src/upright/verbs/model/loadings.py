@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from upright.verbs.values import Log
 
 
+_MOST = 1e6  # kg or kg m^2
+
+
 @command(
     "Model",
     metavars={"added": "INERTIA", "signal": "COLUMN", "rig": "KIND"},
@@ -171,6 +174,8 @@ def plan_inertias(
     choice = choices(rig, [si(r, "m") for r in paths(radius) if not (isinstance(r, str) and not r)])
     bare_inertia = si_if_given(bare, body.unit)
     m_0 = body.rig.plant.parameters()[body.inertia] if bare_inertia is None else bare_inertia
+    if not m_0 <= _MOST:
+        raise BadInput(f"--bare takes the inertia of one body, up to {_MOST:g} {body.unit}, got {m_0:g}.")
     piece = min(w.added for w in choice if w.added > 0)
     piece = piece / 2 if rig == "torsional" else piece
     e, g = _share(error, "--error"), _share(tolerance, "--tolerance")
