@@ -186,7 +186,7 @@ def hostile(content):
     if isinstance(content, list):
         return [hostile(c) for c in content]
     if isinstance(content, dict):
-        kept = ("kind", "key", "name", "draw", "interactive", "markup", "anchors", "numbers")
+        kept = ("kind", "key", "name", "draw", "phone", "interactive", "markup", "anchors", "numbers")
         return {k: c if k in kept else hostile(c) for k, c in content.items()}
     return f"{content} {HOSTILE}" if isinstance(content, str) and content else content
 
