@@ -86,3 +86,11 @@ def test_a_log_without_stamps_is_left_as_it_is(text):
 def test_a_clock_that_passes_midnight_without_a_date_is_refused_with_its_row():
     with pytest.raises(BadInput, match=r"line 3, column 1 \(t\): time must increase"):
         record("t;x\n23:59:59,99;1\n00:00:00,01;2\n")
+
+
+def test_a_log_whose_stamps_end_long_before_it_is_read_as_far_as_they_go():
+    """The last stamp is looked for in the last characters; where there is none, the first stands for it."""
+    remark = "# " + 70 * "x"
+    text, began = in_seconds("t,x\n3/2/2026 10:00:00,1\n3/2/2026 10:00:01,2\n" + 1000 * f"{remark}\n")
+    assert text.splitlines()[1:3] == ["0.000000000,1", "1.000000000,2"]
+    assert began == "3/2/2026 10:00:00"

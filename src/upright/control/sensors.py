@@ -159,9 +159,9 @@ def scales(model: Rig, log: Record, known: Mapping[str, float] | None = None) ->
         left[:, 0] -= drift @ wander
         left[part:] = 0.0
         quarters = max(8.0, 2.0 * float(np.sum(np.diff(np.sign(at[:, 1])) != 0)))
-        before, sigma = (
-            sigma,
-            np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.resolution) * math.sqrt(len(shown) / quarters),
+        before = sigma
+        sigma = np.maximum(np.sqrt(np.mean(left[:part] ** 2, axis=0)), model.resolution) * math.sqrt(
+            len(shown) / quarters
         )
         # unknown: scales, drift of the driven body, numbers of the model in units of what is known of them
         J = np.zeros((p * len(shown) + m, p + 3 + m))

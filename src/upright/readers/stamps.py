@@ -33,7 +33,7 @@ def in_seconds(text: str) -> tuple[str, str]:
         begin = stamp.search(text, begin.start()) or begin
     cells = stamp.sub("", text[begin.start() :])
     mark = "," if parted and "," in cells and "." not in cells else "."
-    *_, end = stamp.finditer(text, max(begin.start(), len(text) - _HEAD)) or (begin,)
+    *_, end = begin, *stamp.finditer(text, max(begin.start(), len(text) - _HEAD))
     lasts = {order: _nanoseconds(end, order) - _nanoseconds(begin, order) for order in (False, True)}
     day_first = 0 <= lasts[True] < lasts[False] or lasts[False] < 0
     first = _nanoseconds(begin, day_first)

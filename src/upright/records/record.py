@@ -39,7 +39,7 @@ KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """Where a record came from; None where nobody said.
+    """Where a record came from; None where it is not known.
 
     `window` is (first, last) time in s of the part kept; `notes` are sentences about what the reader did or found, in
     order.
@@ -237,7 +237,9 @@ class Record(Shown):
             inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
             outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
             window = None if ends is None else (float(ends[0]), float(ends[1]))
-            texts = {k: str(v) for k, v in source.items() if v}  # files of before 1.0 say "" where nobody said
+            texts = {
+                k: str(v) for k, v in source.items() if v
+            }  # files written before 1.0 have "" for what is not known
             provenance = Provenance(**texts, window=window, notes=notes)
         except (ValueError, TypeError, AttributeError, IndexError, KeyError, RecursionError) as error:
             raise BadInput(

@@ -334,7 +334,7 @@ class Rig(Shown):
     def fastest_mode(self) -> float:
         """Magnitude of the fastest mode about any equilibrium [rad/s], on either side where it rests on a kink."""
         models = (self.linear(at, side=side) for at in self.plant.equilibria for side in (-_ASIDE, _ASIDE))
-        return max(float(np.abs(np.linalg.eigvals(model.A)).max()) for model in models)
+        return max((float(np.abs(np.linalg.eigvals(model.A)).max()) for model in models), default=0.0)
 
     def spread(self, at: str) -> list[StateSpace]:
         """The same for the draws."""

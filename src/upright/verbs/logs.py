@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from upright.errors import BadInput
 from upright.files import PathLike, check_output, keeps_its_inputs
@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from upright.records import Record
 
 _CONVERTED = (".csv", ".parquet", ".mat")
+
+
+def _written_as(ending: str) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    """What was typed, with a file that is named after the log where no other is."""
+    return lambda typed: {**typed, "out": typed["out"] or Path(Path(typed["log"]).stem + ending)}
 
 
 @command(
@@ -135,7 +140,7 @@ def log_tail(log: PathLike, *, patience: float = 0.0) -> Iterator[Fresh]:
     name="log recover",
     metavars={"out": "FILE"},
     helps={"out": "File to write; LOG-recovered.mcap here when omitted."},
-    prepare=lambda typed: {**typed, "out": typed["out"] or Path(f"{Path(typed['log']).stem}-recovered.mcap")},
+    prepare=_written_as("-recovered.mcap"),
     more="upright log recover run.mcap -o whole.mcap",
 )
 @keeps_its_inputs
@@ -173,7 +178,7 @@ def log_recover(log: PathLike, *, out: PathLike | None = None) -> Answer[Salvage
     name="log convert",
     metavars={"out": "FILE"},
     helps={"out": "File to write; its ending says the format: .csv, .parquet or .mat. LOG.csv here when omitted."},
-    prepare=lambda typed: {**typed, "out": typed["out"] or Path(f"{Path(typed['log']).stem}.csv")},
+    prepare=_written_as(".csv"),
     more="upright log convert run.mcap -o run.parquet",
 )
 @keeps_its_inputs

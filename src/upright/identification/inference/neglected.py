@@ -225,10 +225,8 @@ def together_late(best: Optimum) -> tuple[str, Estimate] | None:
     if there.lost or there.pinned[places[1]]:
         return None
     slope = np.array([there.values[i] if both.unknowns[i].log else 1.0 for i in places])
-    total, error = (
-        float(there.values[places].sum()),
-        math.sqrt(slope @ there.covariance[np.ix_(places, places)] @ slope),
-    )
+    total = float(there.values[places].sum())
+    error = math.sqrt(slope @ there.covariance[np.ix_(places, places)] @ slope)
     return name, Estimate.within(total, error, best.quantile * error, "s")
 
 

@@ -44,8 +44,7 @@ class SearchLog:
     since and where, `valleys` the same of where else descents ended, `rivals` values of another model that the data do
     not refuse, `unresolved` lengths below the rounding and `unreached` limits. `conventions` says which signs and zeros
     look wrong; evaluated only when a fit is poor, since no search mends a reversed sign. `path` are the mean squared
-    residual and the shared numbers after each
-    accepted step.
+    residual and the shared numbers after each accepted step.
     """
 
     progress: Progress = silent

@@ -219,12 +219,14 @@ def explains_little(problem: Problem, end: Descent) -> bool:
 
 
 AWAY = (1.0, 3.0)
-"""How many standard errors every number is moved by, to either side, each in turn with"""
+"""How many standard errors every number is moved by, to either side."""
 
 NEARER, FARTHER = 0.4, 0.6
-"""these shares of every number that all runs share, to either side and normally distributed: of 20 descents of carts
-that stick two of the latter ended below the lowest optimum known, of the former none; a pair of disks is found by the
-former alone."""
+"""Shares by which every number that all runs share is moved in turn with that: to either side, and normally spread.
+
+The former find two disks whose fit is otherwise lost (`tests/study/draft/test_chain.py`), the latter a lower optimum of
+carts that stick.
+"""
 
 
 def other_valleys(
