@@ -157,7 +157,7 @@ def test_the_command_writes_page_and_numbers(tmp_path):
     found = json.loads(outcome.stdout)
     assert max(t["worst_in_roundings"] for t in found["tables"]) < 1
     page = (tmp_path / "reproduce.html").read_text(encoding="utf-8")
-    assert page.count('<div class="still"') == 4
+    assert page.count('<div class="still') == 4
     assert "http" not in page.replace("http://www.w3.org", "").replace("http-equiv", "")
     told = CliRunner().invoke(app, ["reproduce", "-o", str(tmp_path)], terminal_width=200).stdout
     assert "What next" in told

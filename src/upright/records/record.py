@@ -237,9 +237,7 @@ class Record(Shown):
             inputs = tuple(str(name) for name in about.get("inputs", ()) if name in signals)
             outputs = tuple(str(name) for name in about.get("outputs", ()) if name in signals)
             window = None if ends is None else (float(ends[0]), float(ends[1]))
-            texts = {
-                k: str(v) for k, v in source.items() if v
-            }  # files written before 1.0 have "" for what is not known
+            texts = {k: str(v) for k, v in source.items() if v}  # before 1.0 "" was written for what is not known
             provenance = Provenance(**texts, window=window, notes=notes)
         except (ValueError, TypeError, AttributeError, IndexError, KeyError, RecursionError) as error:
             raise BadInput(
