@@ -1,5 +1,5 @@
-"""What may a study say? Every key with its form and meaning, of ``keys.toml``; the check and `docs/study.md` both come
-from here.
+"""What may a study say? Every key with its form and meaning, of ``keys.toml``; the check and `docs/reference/study.md`
+both come from here.
 """
 
 from __future__ import annotations

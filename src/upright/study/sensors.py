@@ -161,7 +161,7 @@ class Grid:
         Raises
         ------
         BadInput
-            When the record is silent for most of the window, or the period leaves too few samples.
+            When the record has a gap too long to bridge, or the period leaves too few samples.
         """
         steps = np.diff(t)
         median = float(np.median(steps))
