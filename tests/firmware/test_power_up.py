@@ -160,6 +160,8 @@ def test_the_dead_zone_is_between_the_two_commands_that_it_tells(walked, request
     jitter = 8 * MEGA_STEP if "Mega" in request.node.name else 0.0
     assert below - jitter - 1e-3 <= 0.4 <= first + jitter  # within a mV three counts do not show yet
     assert first <= 1.5 * below * (1 + 1e-9)
+    lost, error = checkup.lost  # a true value anywhere between the two is within sqrt(3) standard errors
+    assert abs(lost - 0.4) <= math.sqrt(3) * error + jitter + 1e-3
     assert checkup.sound, checkup.verdict
     text = (tmp_path / "RIG.toml").read_text(encoding="utf-8")
     assert text.startswith(RIG.partition("port")[0])  # the rest stays as its owner wrote it

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from upright.rig.makes import make_rig
@@ -162,7 +163,7 @@ def moves(dead, of=1.0, back=None):
 
 
 def test_pulses_grow_by_half_until_the_body_moves_to_either_side():
-    """From 0.2 % of 10 V on: 0.02 * 1.5^k; what is swallowed lies in the middle of two of them."""
+    """From 0.2 % of 10 V on: 0.02 * 1.5^k; the dead zone lies in the middle of two of them."""
     walk, beside, script = steps(rig=CART.changed(b_1c=0.0, b_1s=0.0))
     script(moves(0.5, back=0.8))
     found = {f.what: f for f in walk.drive()}
@@ -175,9 +176,13 @@ def test_pulses_grow_by_half_until_the_body_moves_to_either_side():
     up = next(h for h in heights if 0.1 * (h - 0.5) > 0.03)
     down = next(h for h in heights if 0.1 * (h - 0.8) > 0.03)
     assert first == pytest.approx(up)
-    assert found["the drive, forward"].observed == f"x moves from {up:.3g} V on, and not at {up / 1.5:.3g} V"
+    lost, error = (up / 1.5 + up) / 2, (up - up / 1.5) / math.sqrt(12)
+    assert walk.lost == pytest.approx((lost, error))
+    assert found["the drive, forward"].observed == (
+        f"x moves from {up:.3g} V on, and not at {up / 1.5:.3g} V: a dead zone of {lost:.3g} V, standard error "
+        f"{error:.2g} V"
+    )
     assert found["the drive, backward"].observed == f"moves from {down:.3g} V on, and not at {down / 1.5:.3g} V"
-    assert walk.swallowed == f"{(up / 1.5 + up) / 2:.3g} V"
     assert min(beside.pulses) == pytest.approx(-down)
 
 
@@ -187,11 +192,30 @@ def test_what_friction_takes_is_no_dead_zone():
     p = CART.plant
     takes = max(p.b_1c, p.b_1s) / CART.gain
     walk.dead_zone = (0.9 * takes, 1.35 * takes)
-    assert walk.swallowed == ""
+    assert walk.lost == (0.0, 0.0)
     walk.dead_zone = (2 * takes, 3 * takes)
-    assert walk.swallowed == f"{1.5 * takes:.3g} V"
+    assert walk.lost == pytest.approx((1.5 * takes, takes / math.sqrt(12)))
     walk.dead_zone = (0.0, 0.02)
-    assert walk.swallowed == ""
+    assert walk.lost == (0.0, 0.0)
+
+
+def test_the_errors_of_dead_zones_are_as_large_as_their_standard_error_says():
+    """Of true dead zones all over two steps of the pulses, none of which is special: their logarithms are uniform.
+
+    Between pulses of 1 and 1.5 the density of a true x is 1/(x ln 1.5), told is 1.25, so by integration the errors are
+    0.1451 in the root mean square, where the standard error says 0.5/sqrt(12) = 0.1443; 57.2 % are smaller than that,
+    and none is larger than sqrt(3) times.
+    """
+    share, rig = [], CART.changed(b_1c=0.0, b_1s=0.0).replace(counts=[100.0, 2 * math.pi * 1000])
+    for true in 0.02 * 1.5 ** (np.arange(80) / 40 + 7.0125):
+        walk, _, script = steps(rig=rig)
+        script(moves(true, of=1e4))  # three counts are 30 uV
+        next(walk.drive())
+        lost, error = walk.lost
+        share.append(abs(lost - true) / error)
+    assert np.sqrt(np.mean(np.square(share))) == pytest.approx(0.1451 / 0.1443, abs=5e-3)
+    assert np.mean(np.less(share, 1.0)) == pytest.approx(0.572, abs=1 / 40)
+    assert max(share) < math.sqrt(3.0) + 1e-3
 
 
 def test_a_drive_is_told_by_what_it_moves():

@@ -113,7 +113,7 @@ def checkup_chapter(checkup: Checkup, rig: str) -> Chapter:
         title=f"Check-up of {checkup.name}", verdict=checkup.verdict, sound=checkup.sound, steps=(step,),
         warnings=(NO_SAFETY,), numbers={
             "findings": [vars(f) for f in checkup.findings], "verdict": checkup.verdict, "counts": dict(checkup.counts),
-            "dead_zone": list(checkup.dead_zone),
+            "dead_zone": list(checkup.dead_zone), "lost": list(checkup.lost),
         },
         parts=(Part("What was looked at", (Table(caption="", headings=("", "found", ""), rows=rows),)),),
     )  # fmt: skip

@@ -32,6 +32,9 @@ class Checkup:
     dead_zone : tuple of (float, float)
         Largest command that did not move the driven body, and smallest that did [command unit]; zeros where no drive
         was tried.
+    lost : tuple of (float, float)
+        Command that the drive's dead zone takes to either side, and its standard error by the steps of the pulses
+        [command unit]; zeros where none is seen beyond the model's dry friction.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Checkup:
     counts: Mapping[str, float] = field(default_factory=dict[str, float])
     written: Path | None = None
     dead_zone: tuple[float, float] = (0.0, 0.0)
+    lost: tuple[float, float] = (0.0, 0.0)
 
     @property
     def sound(self) -> bool:
@@ -121,13 +125,15 @@ def check_up(
         f"Shall {path} take the counts that were seen, {lines}? No, if you rather swap channels."
     ):  # fmt: skip
         written = file.with_counts(counts)
-    swallowed = steps.swallowed
-    if swallowed and hand is not None and file.hardware and hand(
-        f"Shall {path} take the drive's dead zone, {swallowed}? A law that knows it makes up for it."
+    (lost, error), unit = steps.lost, model.unit
+    if lost and hand is not None and file.hardware and hand(
+        f"Shall {path} take the drive's dead zone, {lost:.3g} {unit} (standard error {error:.2g} {unit})? A law that "
+        "knows it makes up for it."
     ):  # fmt: skip
-        written = file.with_dead_zone(swallowed)
+        written = file.with_dead_zone(f"{lost:.3g} {unit}")
     return Checkup(
-        name=model.name, findings=tuple(out), counts=counts, written=written, dead_zone=steps.dead_zone
+        name=model.name, findings=tuple(out), counts=counts, written=written, dead_zone=steps.dead_zone,
+        lost=steps.lost,
     )  # fmt: skip
 
 

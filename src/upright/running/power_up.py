@@ -205,7 +205,7 @@ class FirstPowerUp:
             yield self._nothing_moves(what)
             return
         self.dead_zone = below, first
-        unit = self.model.unit
+        unit, (lost, error) = self.model.unit, self.lost
         if moved[self.driven] < 0:
             yield CheckupFinding(
                 what=what, good=False,
@@ -214,7 +214,8 @@ class FirstPowerUp:
             )  # fmt: skip
             return
         not_yet = f", and not at {below:.3g} {unit}" if below else ""
-        yield CheckupFinding(what=what, observed=f"{self._driven_name} moves from {first:.3g} {unit} on{not_yet}")
+        zone = f": a dead zone of {lost:.3g} {unit}, standard error {error:.2g} {unit}" if lost else ""
+        yield CheckupFinding(what=what, observed=f"{self._driven_name} moves from {first:.3g} {unit} on{not_yet}{zone}")
         yield self._size(first)
         self._steadied()
         below, first, moved = self._first_move(-1.0)
@@ -228,17 +229,18 @@ class FirstPowerUp:
         yield CheckupFinding(what="the drive, backward", observed=f"moves from {first:.3g} {unit} on{not_yet}")
 
     @property
-    def swallowed(self) -> str:
-        """The dead zone by the first motion, with its unit; empty where there is none beyond friction.
+    def lost(self) -> tuple[float, float]:
+        """Dead zone by the first motion, and its standard error; zeros where there is none beyond friction.
 
         In the middle between the largest command that moved nothing and the smallest that did, less what the model's
-        dry friction takes of it.
+        dry friction takes of it. Anywhere between the two is as likely, so the error is their distance over sqrt(12);
+        what is wrong with the model's friction is not in it.
         """
         below, first = self.dead_zone
         friction = sticking(self.model)
         if not below or below <= friction:
-            return ""
-        return f"{(below + first) / 2 - friction:.3g} {self.model.unit}"
+            return 0.0, 0.0
+        return (below + first) / 2 - friction, (first - below) / math.sqrt(12.0)
 
     def _steadied(self, request: str = "Bring all to rest where it hangs, and take your hands away.") -> None:
         if self.hand is not None:

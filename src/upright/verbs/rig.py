@@ -241,7 +241,8 @@ def rig_doctor(
     Returns
     -------
     Answer
-        Of a `Checkup`: `findings`, each with its `fix`; `counts` and `dead_zone` as they were seen.
+        Of a `Checkup`: `findings`, each with its `fix`; `counts` and `dead_zone` as they were seen; `lost`, what the
+        dead zone takes with its standard error.
 
     Raises
     ------
