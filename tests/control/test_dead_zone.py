@@ -59,7 +59,7 @@ def test_a_design_says_the_cycle_by_its_first_harmonic_beside_the_simulated_one(
     page = up.design(rig, poles=list(POLES), memory=0.2).chapter
     text = next(block for part in page.parts if part.title == "The loop as it runs" for block in part.content
                 if isinstance(block, str))  # fmt: skip
-    said = text.partition(" The drive swallows ")[2].replace("±", "")
+    said = text.partition(" dead zone of ")[2].replace("±", "")
     numbers = [float(n) for n in re.findall(r"(?<![\w.])\d+\.?\d*(?= V| rad/s)", said)]
     swallowed, size, frequency, simulated, at = numbers
     assert swallowed == dead_zone
@@ -72,4 +72,4 @@ def test_a_design_says_the_cycle_by_its_first_harmonic_beside_the_simulated_one(
 
 def test_a_design_for_a_drive_without_a_dead_zone_says_nothing_of_one():
     page = up.design(RIG, poles=list(POLES)).chapter
-    assert "swallows" not in str(page.parts)
+    assert "dead zone" not in str(page.parts)

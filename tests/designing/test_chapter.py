@@ -88,6 +88,8 @@ def test_a_loop_that_falls_is_not_sound_and_is_not_taken_anywhere(done):
     assert not any("upright export" in c for c in commands)
     assert any("upright export" in s.command for s in chapter(with_margins(done, FINE)).steps)
     assert "takes" not in page.parts[2].content[0]  # no peak of a loop that falls
+    already = chapter(replace(falls, request=replace(falls.request, sampled=True)))
+    assert not any("--sampled" in step.command for step in already.steps)
 
 
 @pytest.mark.parametrize(("rig", "speeds", "units"), [
@@ -153,6 +155,10 @@ def test_poles_of_sampled_matrices_are_those_whose_motion_outlasts_a_third_of_a_
     rows = {row[0]: row[1] for row in tables(told)[1].rows}
     assert rows["model, open loop"][1:] == "3, and 1 faster"  # behind its minus
     assert "faster" not in rows["requested"]
+    fast = StateSpace(A=[[math.exp(-700 * 0.005)]], B=[[0.2]], C=[[1.0]], dt=0.005)
+    told = chapter(design_for(fast, DesignRequest(at="", poles=(-5.0,), period=5e-3, speed="")))
+    assert tables(told)[1].rows[0] == ("model, open loop", "1 faster")
+    assert told.title == "Gains for plain matrices"  # which have no name
 
 
 def test_the_file_of_a_double_integrator_s_design_holds_what_can_be_worked_out_by_hand():

@@ -3,8 +3,10 @@
 import sys
 
 import jinja2
+import numpy as np
 import pytest
 
+from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.page import Code, Picture, Points, Step, Symbol, Table
 from upright.report.prose import chapter_of
 
@@ -46,6 +48,17 @@ upright show
 - Look at it. `upright show a.csv`
 - Think.
 """
+
+
+def test_a_chart_is_placed_as_one_that_answers_a_cursor(module):
+    line = ChartLine(name="", x=np.arange(2.0), y=np.arange(2.0))
+    chart = Chart(x="time", unit="s", panels=(ChartPanel(title="x", unit="m", lines=(line,)),))
+    page = chapter_of(
+        module("# T\n\nV.\n\n## P\n\n![It rises.](line) As\nmeasured.\n", "prose_chart"), figures={"line": chart}
+    )
+    (picture,) = page.parts[0].content
+    assert (picture.kind, picture.name) == ("chart", "line")
+    assert (picture.caption, picture.description) == ("As measured.", "It rises.")
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A design as a chapter: gains, poles, the loop as it runs, and what they are worth."""
+"""A design as a chapter: the numbers and charts that its words in `chapter.md` print, and what programs read."""
 
 from __future__ import annotations
 
@@ -8,73 +8,45 @@ from typing import Any
 
 import numpy as np
 
-from upright.basis import NOT_TRUSTED, in_percent
+from upright.basis import NOT_TRUSTED
 from upright.control.effort import shown
-from upright.designing.run import Designed, Holding, VelocityLoop
+from upright.designing.run import Designed, Holding
 from upright.gains.loop import response
 from upright.gains.lqr import locus
 from upright.gains.requests import Roots, written
 from upright.laws import as_values
 from upright.records import Array
 from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
-from upright.report.page import Block, Chapter, Part, Picture, Points, Step, Table, resting_on
+from upright.report.page import Chapter, resting_on
 from upright.report.planes import Poles, locus_chart, loop_chart, pole_chart
+from upright.report.prose import chapter_of
 from upright.report.rig import rig_drawing, rig_table
-from upright.report.symbols import number, plain
+from upright.report.symbols import plain
 from upright.report.symbols import unit as raised
-from upright.rig import Rig
 from upright.rig.completion import doubts
 from upright.systems import StateSpace, to_s
 
 
 def chapter(design: Designed, *, source: str = "OUT/fit.json", folder: str = ".") -> Chapter:
     """What a design says; fit or study and the folder of its files are named as they were typed."""
-    poles = "with poles " if design.request.proposed is None else "with proposed poles "
-    aim = poles + written(design.request.poles) if design.request.poles is not None else "by LQR"
-    gains: list[str] = []
-    if design.request.proposed is not None:
-        gains.append(
-            f"No poles were requested. These are proposed: {design.request.proposed:g} times as fast as the model "
-            "falls or swings by itself, the quietest of those with nearly the largest modulus margin. Ask "
-            "for others with --poles or --lqr."
-        )
-    if design.placement is not None:
-        gains.append(f"Largest miss of a requested pole: {design.placement.miss:.1g} 1/s. {design.placement.sentence}")
-    if design.R is not None:
-        gains.append(f"Weight of the effort: {number(design.R)}.")
-    sure: list[Block] = []
-    if design.chance is not None:
-        stable = design.basis.supported(in_percent(design.chance))
-        what = "Share of the rigs sampled from the fit's covariance that these gains stabilise"
-        sure.append(Points((f"{what}: {stable}.",)))
-    plain_matrices = isinstance(design.rig, StateSpace)
-    loop = (
-        f"Period {1e3 * design.request.period:.4g} ms, command {design.sampled.delay:.3g} samples late "
-        f"({_delay_from(design)}), drive's lag {1e3 * design.sampled.lag:.3g} ms, "
-        f"{f'states by {design.chosen.name}' if plain_matrices else 'velocities made from rounded encoders'}."
-        f"{_effort(design)}{_dead_zone(design)}"
-    )
-    what = f"{design.rig.name}, {design.request.at}".removesuffix(", ")
-    held = "the model" if plain_matrices else f"the rig at '{design.request.at}'"
-    trial = "sampling, delay and " + ("their way to the states" if plain_matrices else "differenced encoders")
-    page = Chapter(
-        title=f"Gains for {what}",
-        verdict=design.verdict,
-        sound=design.chosen.margins is not None and "reservations" not in design.verdict,
-        question=f"Which gains hold {held} {aim}, and do they survive {trial}?",
-        parts=(
-            Part("Gains", (Points(tuple(gains)), _gain_table(design), _pole_table(design))),
-            Part("Poles", (*sure, *_pole_pictures(design))),
-            Part("The loop as it runs", (loop, *_loop_picture(design), _way_table(design))),
-            Part("Coming back", (_swing_picture(design),)),
-            *((Part("The rig", (rig_table(design.request.on),)),) if design.request.on else ()),
-        ),
-        steps=tuple(_next_steps(design, source, folder)),
-        warnings=_doubts(design),
-        numbers=_numbers(design),
-    )
-    page = resting_on(page, design.basis)
-    return page if isinstance(design.rig, StateSpace) else replace(page, drawing=rig_drawing(design.rig.plant))
+    matrices, kinds, on = isinstance(design.rig, StateSpace), _kinds(design), design.request.on
+    page = chapter_of(
+        __name__, design=design, source=source, folder=folder, matrices=matrices, kinds=kinds,
+        discrete=design.model.dt is not None, not_trusted=design.basis.level == NOT_TRUSTED,
+        delay_from=_delay_from(design), poles=written, lasting=_lasting, per=_per, rest=_at_rest_in_words(design),
+        dead_zone=0.0 if on is None else on.more.get("actuator.dead_zone", 0.0), tau=math.tau,
+        figures={
+            "poles": pole_chart(kinds, design.cloud, cloud_of="loop, rigs that the fit allows"),
+            "locus": _locus(design), "loop": _loop(design), "swing": _recovery(design),
+        },
+        placed={"rig": (rig_table(on),) if on else ()},
+    )  # fmt: skip
+    page = replace(
+        page, sound=design.chosen.margins is not None and "reservations" not in page.verdict,
+        warnings=_doubts(design), numbers=_numbers(design),
+        drawing=None if isinstance(design.rig, StateSpace) else rig_drawing(design.rig.plant),
+    )  # fmt: skip
+    return resting_on(page, design.basis)
 
 
 def _delay_from(design: Designed) -> str:
@@ -103,81 +75,16 @@ def _doubts(design: Designed) -> tuple[str, ...]:
     )
 
 
-def _gain_table(design: Designed) -> Table:
-    """The gains in force, and those that meet the poles in the sampled loop."""
-    command = design.rig.unit or "1"
-    sampled = design.sampled_gains
-    rows = tuple(
-        (plain(name), number(k, 5), *((number(sampled[0, i], 5),) if sampled is not None else ()), _per(command, unit))
-        for i, (name, k, unit) in enumerate(
-            zip(design.model.states, design.continuous[0], design.rig.state_units, strict=True)
-        )
-    )  # fmt: skip
-    marks = ("", " (used)") if design.request.sampled else (" (used)", "")
-    second = ("K, sampled" + marks[1],) if sampled is not None else ()
-    headings = ("state", f"K, {_of_model(design)}" + marks[0], *second, "unit")
-    caption = "Gains of u = −K x" + (f", prefilter k_pf = {number(design.k_pf)}" if design.k_pf is not None else "")
-    return Table(caption=caption, headings=headings, rows=rows, numbers=tuple(range(1, len(headings) - 1)))
-
-
-def _pole_table(design: Designed) -> Table:
-    """Requested poles, those attained by the gains on the continuous model, and of the loop as it runs."""
-    discrete = design.model.dt is not None
-    rows = [("model, open loop", _outlasting(design, design.open_loop, 5) if discrete else written(design.open_loop))]
-    if design.placement is not None:
-        rows.append(("requested", written(design.placement.requested)))
-        rows.append((f"attained, {_of_model(design)}", written(design.placement.attained)))
-    else:
-        least = _outlasting(design, design.wanted, 5) if discrete else written(design.wanted)
-        rows.append((f"LQR, {_of_model(design)}", least))
-    rows.append(("loop as it runs", _outlasting(design, design.poles, 4)))
-    return Table(caption="Poles [1/s]", headings=("", "poles"), rows=tuple(rows))
-
-
-def _of_model(design: Designed) -> str:
-    """Which model gains or poles belong to, before its loop."""
-    return "at the samples" if design.model.dt is not None else "continuous"
-
-
 def _drawn(design: Designed, poles: Roots) -> Roots:
     """Poles that a picture has room for: of sampled matrices those whose motion outlasts a few samples."""
     return poles[poles.real > -3.0 / design.request.period] if design.model.dt is not None else poles
 
 
-def _outlasting(design: Designed, poles: Roots, digits: int) -> str:
-    """Poles whose motion outlasts a few samples, and how many die out at once (z close to 0)."""
+def _lasting(design: Designed, poles: Roots, digits: int) -> str:
+    """Poles, of a loop or of samples those whose motion outlasts a few samples, and how many die out at once."""
     slow = poles[poles.real > -3.0 / design.request.period]
     beyond = poles.size - slow.size
-    return written(slow, digits) + (f", and {beyond} faster" if beyond else "")
-
-
-def _way_table(design: Designed) -> Table:
-    """Velocities by difference, filtered difference and Kalman filter, side by side."""
-    rows = tuple((way.name + (" (chosen)" if way is design.chosen else ""), *_worth(way)) for way in design.ways)
-    margins = ("gain between", "phase [deg]", "delay [ms]", "modulus margin")
-    caption = "factors on the command, phase, more delay, distance of the loop gain to −1; all with the same gains"
-    if design.chosen.speed_noise is None:
-        return Table(caption=f"Margins: {caption}", headings=("states from", *margins), rows=rows, numbers=(2, 3, 4))
-    speeds = ", ".join(design.rig.state_units[1::2])
-    noise = (f"speed noise [{speeds}]", f"command noise [{design.rig.unit}]")
-    return Table(
-        caption=f"Noise from rounding encoders, and margins: {caption}", headings=("velocities from", *noise, *margins),
-        rows=rows, numbers=(2, 4, 5, 6),
-    )  # fmt: skip
-
-
-def _worth(way: VelocityLoop) -> tuple[str, ...]:
-    noise: tuple[str, ...] = ()
-    if way.speed_noise is not None:
-        command = "falls" if way.command_noise is None else number(way.command_noise, 2)
-        noise = (", ".join(number(v, 2) for v in way.speed_noise), command)
-    if way.margins is None:
-        return (*noise, "–" if noise else "falls", "–", "–", "–")
-    m = way.margins
-    return (
-        *noise, f"{number(m.least_gain, 2)} and {number(m.most_gain, 3)}", number(math.degrees(m.phase), 3),
-        number(1e3 * m.delay, 3), number(m.modulus, 2),
-    )  # fmt: skip
+    return ", and ".join(filter(None, (written(slow, digits), f"{beyond} faster" if beyond else "")))
 
 
 def _per(command: str, unit: str) -> str:
@@ -248,138 +155,46 @@ def _readings(design: Designed) -> list[dict[str, Any]]:
     ]
 
 
-def _effort(design: Designed) -> str:
-    if not math.isfinite(design.peak_sampled):
+def _at_rest_in_words(design: Designed) -> str:
+    """The simulated command at rest; nothing where none was simulated, or where the rig was lost."""
+    holding = design.holding
+    if holding is None or math.isfinite(holding.lost):
         return ""
-    rest = ""
-    if design.holding is not None and math.isinf(design.holding.lost):
-        rest = (
-            " Simulated with counts and dry friction, the command at rest "
-            f"{shown(design.holding.effort, design.request.limit or math.inf, design.rig.unit)}."
-        )
-    return rest + (
-        f" The requested start takes {number(design.peak_sampled, 3)} {design.rig.unit} at most, "
-        f"{number(design.peak, 3)} {design.rig.unit} by the continuous model."
-    )
+    return shown(holding.effort, design.request.limit or math.inf, design.rig.unit)
 
 
-def _dead_zone(design: Designed) -> str:
-    """The cycle that the drive's dead zone keeps up: by its describing function, and simulated."""
-    lost = 0.0 if design.request.on is None else design.request.on.more.get("actuator.dead_zone", 0.0)
-    if not lost or design.chosen.margins is None:
-        return ""
-    unit, held = design.rig.unit, design.holding
-    size, frequency = design.chosen.margins.dead_zone_cycle(lost)
-    swallows = f" The drive swallows {number(lost, 3)} {unit} to either side"
-    expected = f": by its first harmonic the loop cycles by ±{number(size, 2)} {unit} at {number(frequency, 2)} rad/s"
-    if not size:
-        expected = ", which by its first harmonic keeps no cycle up"
-    if held is None or math.isfinite(held.lost):
-        return f"{swallows}{expected}."
-    cycle = held.effort.command
-    if cycle is None:
-        return f"{swallows}{expected}; simulated with counts and dry friction it keeps no regular one."
-    return (
-        f"{swallows}{expected}; simulated with counts and dry friction by ±{number(cycle.size, 2)} {unit} at "
-        f"{number(2 * math.pi / cycle.period, 2)} rad/s."
-    )
-
-
-def _next_steps(design: Designed, source: str, folder: str) -> list[Step]:
-    """What to try after this design."""
-    steps: list[Step] = []
-    if design.basis.level == NOT_TRUSTED:
-        steps.append(
-            Step("Mend the model first: do what its own verdict asks for, and identify again.",
-                 "upright identify STUDY.toml -o OUT")
-        )  # fmt: skip
-    plain_matrices = isinstance(design.rig, StateSpace)
-    base = f"upright design {source}" + ("" if plain_matrices else f" --at {design.request.at}")
-    if design.sampled_gains is not None and (design.chosen.margins is None or design.chosen.margins.modulus < 0.4):
-        steps.append(
-            Step("Make up for delay and differences: gains that meet the poles in the sampled loop.",
-                 f'{base} --poles "{written(design.wanted)}" --sampled'.replace("±", "+-"))
-        )  # fmt: skip
-    if design.request.poles is not None and not design.model.dt is not None:
-        limit = " --limit LIMIT" if design.request.limit is None else ""
-        steps.append(
-            Step("Use LQR, its effort weight chosen by the drive's limit for this start.",
-                 f"{base} --lqr {','.join('1' for _ in design.model.states)}{limit}")
-        )  # fmt: skip
-    if isinstance(design.rig, Rig) and not design.rig.draws:
-        steps.append(
-            Step("See what the uncertainty of the numbers does to the poles: design from a fit.json.",
-                 "upright identify STUDY.toml -o OUT && upright design OUT/fit.json")
-        )  # fmt: skip
-    if design.chosen.margins is not None:
-        steps.append(
-            Step("Take the law to the computer that closes the loop, in C or another form: upright export --help.",
-                 f"upright export {folder}/design.json --to c")
-        )  # fmt: skip
-    steps.append(
-        Step(f"Simulate it: `upright.laws.of_values` reads the law from {folder}/design.json.")
-    )  # fmt: skip
-    if not plain_matrices:
-        steps.append(Step("Run it on the rig, or on its twin (RIG.toml: docs/howto/rigs.md).",
-                          f"upright run --rig RIG.toml --law {folder}/design.json"))  # fmt: skip
-    return steps
-
-
-def _pole_pictures(design: Designed) -> list[Picture]:
-    """Poles in the s-plane, and the LQR locus as the effort's weight varies, a hundredfold either way."""
+def _kinds(design: Designed) -> list[Poles]:
+    """Poles as the s-plane marks them."""
     aim = "requested" if design.placement else "LQR"
-    kinds = [
+    return [
         Poles(name="model, open loop", values=_drawn(design, design.open_loop), mark="x"),
         Poles(name=aim, values=_drawn(design, design.wanted), mark="o", colour="q0"),
         Poles(name="loop as it runs", values=_drawn(design, design.poles), mark="+", colour="q1"),
     ]
-    drawn = pole_chart(kinds, design.cloud, cloud_of="loop, rigs that the fit allows")
-    pictures = [
-        drawn.picture(
-            "poles",
-            caption="Poles in the upper half of the s-plane; those of the loop as it runs are s = ln(z)/T of its "
-            "sampled poles. Tinted: unstable.",
-            description="; ".join(f"{k.name}: {written(k.values, 4)}" for k in kinds),
-        )
-    ]
+
+
+def _locus(design: Designed) -> Chart | None:
+    """The LQR locus as the effort's weight varies, a hundredfold either way."""
     if design.R is None:
-        return pictures
+        return None
     weights = design.request.weights or (1.0,) * design.model.A.shape[0]
     discrete = design.model.dt is not None
     cheaper = design.R * np.geomspace(100, 0.01, 300)
     tracks = locus(design.model.A, design.model.B, weights, cheaper, sampled=discrete)
     tracks = to_s(tracks, design.request.period) if discrete else tracks
     chosen = {"chosen": _drawn(design, design.wanted)}
-    cheaper_effort = locus_chart(
+    return locus_chart(
         tracks, cheaper, chosen, _drawn(design, design.open_loop), of="LQR poles as effort gets cheaper", symbol="R"
     )
-    locus_of = cheaper_effort.picture(
-        "locus",
-        caption="LQR poles as the effort gets cheaper, from a hundred times the weight chosen to a hundredth.",
-        description=f"Chosen: R = {number(design.R)}, poles {written(design.wanted, 4)}.",
-    )
-    return [*pictures, locus_of]
 
 
-def _loop_picture(design: Designed) -> list[Picture]:
+def _loop(design: Designed) -> Chart | None:
     """The loop gain with its margins; nothing where the loop falls."""
     m = design.chosen.margins
-    if m is None:
-        return []
-    drawn = loop_chart(response(design.sampled, design.law), m, design.sampled.period)
-    return [
-        drawn.picture(
-            "loop",
-            caption="Bode plot of the loop gain, cut at the command. Dashed in the phase: where the gain is 1, with "
-            "the phase margin. Dashed in the magnitude: where the phase is ±180°, with the factor on the command that "
-            "the loop bears.",
-            description=f"Phase margin {number(math.degrees(m.phase), 3)} deg; stable for factors on the command "
-            f"from {number(m.least_gain, 2)} to {number(m.most_gain, 3)}.",
-        )
-    ]
+    return None if m is None else loop_chart(response(design.sampled, design.law), m, design.sampled.period)
 
 
-def _swing_picture(design: Designed) -> Picture:
+def _recovery(design: Designed) -> Chart:
     t, y, u = design.swing
     limit = design.request.limit
     reach = 1.25 * max(limit or 0.0, float(np.abs(u).max()))
@@ -392,11 +207,7 @@ def _swing_picture(design: Designed) -> Picture:
         limits=None if limit is None else (-reach, reach),
         levels=() if limit is None else ((limit, "limit"), (-limit, "")),
     )
-    return Chart(x="time", unit="s", panels=(*panels, command)).picture(
-        "swing",
-        caption="Linear model, continuous gains: the way back from the requested start, and the command it takes.",
-        description=f"The command peaks at {design.peak:.3g} {design.rig.unit}.",
-    )
+    return Chart(x="time", unit="s", panels=(*panels, command))
 
 
 def _over(t: Array, values: Array, title: str, unit: str, colour: str) -> ChartPanel:

@@ -30,7 +30,7 @@ A template is Jinja's over Markdown as far as a chapter has it::
     - What to do. `command`
 
 ``*name* [unit]`` in a cell is a `Symbol`, a column in the middle (``:-:``) holds badges; ``![...](name)`` draws a
-picture, ``[name]`` sets blocks and ``## [name]`` whole parts that the code hands over.
+picture or a chart, ``[name]`` sets blocks and ``## [name]`` whole parts that the code hands over.
 A name that the template misspells is an error.
 """
 
@@ -43,6 +43,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from upright.basis import in_percent
+from upright.report.interactive.charts import Chart
 from upright.report.page import Block, Chapter, Code, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import number, percent, plain, typed, unit
 
@@ -61,10 +62,11 @@ _PART = re.compile(r"(.*?)(?: \{(\w+)\})?")
 _STEP = re.compile(r"(.*?)(?: `(.*)`)?", re.S)
 
 Placed = Mapping[str, Sequence[Block | Part]]
+Figures = Mapping[str, Callable[[], Any] | Chart | None]
 
 
 def chapter_of(
-    module: str, *, template: str = "", figures: Mapping[str, Callable[[], Any]] | None = None,
+    module: str, *, template: str = "", figures: Figures | None = None,
     placed: Placed | None = None, **values: Any,
 ) -> Chapter:  # fmt: skip
     """The template beside a module as a chapter: title, question, verdict, detail, parts and what to do next.
@@ -75,8 +77,8 @@ def chapter_of(
         Its ``__name__``.
     template : str
         Name of the template without its ending; the module's own when empty.
-    figures : mapping of str to callable, optional
-        Draws each picture that the template places.
+    figures : mapping of str to callable or Chart, optional
+        Each picture that the template places: what draws it, or a chart.
     placed : mapping of str to sequence of Block or Part, optional
         What the template sets by ``[name]`` and ``## [name]``.
     **values
@@ -172,7 +174,7 @@ def _step(text: str) -> Step:
     return Step(match[1], match[2] or "")
 
 
-def _part(heading: str, body: str, figures: Mapping[str, Callable[[], Any]], placed: Placed) -> Part:
+def _part(heading: str, body: str, figures: Figures, placed: Placed) -> Part:
     match = _PART.fullmatch(heading)
     assert match is not None
     content: list[Block] = []
@@ -183,7 +185,7 @@ def _part(heading: str, body: str, figures: Mapping[str, Callable[[], Any]], pla
     return Part(match[1], tuple(content), folded=match[2] == "folded", aside=match[2] == "aside")
 
 
-def _block(text: str, figures: Mapping[str, Callable[[], Any]]) -> Block:
+def _block(text: str, figures: Figures) -> Block:
     if "![" in text[1:]:
         raise ValueError(f"a picture needs a blank line before it: {text}")
     if text.startswith("|"):
@@ -193,8 +195,12 @@ def _block(text: str, figures: Mapping[str, Callable[[], Any]]) -> Block:
     if text.startswith("```"):
         return Code(text.strip("`\n"))
     if match := _PICTURE.fullmatch(text):
-        name = match[2]
-        return Picture(name=name, draw=figures[name], caption=_line(match[3]), description=_line(match[1]))
+        name, caption, description = match[2], _line(match[3]), _line(match[1])
+        drawn = figures[name]
+        assert drawn is not None, f"{name} is placed and not drawn"
+        if isinstance(drawn, Chart):
+            return drawn.picture(name, caption=caption, description=description)
+        return Picture(name=name, draw=drawn, caption=caption, description=description)
     return _line(text)
 
 
