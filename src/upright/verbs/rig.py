@@ -212,7 +212,7 @@ def _for_hardware(typed: dict[str, Any]) -> dict[str, Any]:
     prepare=_for_hardware,
     wrong=lambda answer: not answer.chapter.sound,
     more="""
-    It asks for what a person does, and says what is wrong and what mends it; docs/build.md is the page to it.
+    It asks for what a person does, and says what is wrong and how to mend it; see docs/tutorials/own_rig.md.
 
     upright rig doctor RIG.toml
     """,
