@@ -29,6 +29,31 @@ def test_late_samples_and_a_clock_within_its_tolerance_are_no_slow_tick():
     assert all(ticking.sees(k * 1e-3, k * 1e-3 * (1 + OFF / 2) + x) == 1.0 for k, x in enumerate(late))
 
 
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_tick_that_changes_after_a_minute_is_measured_within_two_seconds(factor):
+    """Since the first sample alone it would take 1.83/0.47 = 3.9 s, and 38 s after ten minutes, and say 1.03."""
+    ticking, rng = TickLength(), np.random.default_rng(6)
+    late, sound = rng.uniform(0, 2e-3, 80_000), 60_000
+    for k in range(sound):
+        assert ticking.sees(k * 1e-3, k * 1e-3 + late[k]) == 1.0
+    host = 60.0 + factor * 1e-3 * np.arange(1, 20_000)
+    for k, x in enumerate(host):
+        longer = ticking.sees(60.0 + (k + 1) * 1e-3, x + late[sound + k])
+        if longer != 1.0:
+            assert x - 60.0 < 2.0
+            assert longer == pytest.approx(factor, rel=0.02)  # times of 0.25 s and more, each late by up to 2 ms
+            return
+    pytest.fail("it was never seen")
+
+
+def test_a_host_that_sleeps_for_half_a_second_after_a_minute_has_not_slowed_the_board():
+    """What came meanwhile is late by what is left of the sleep, in a whole piece of the time compared."""
+    ticking = TickLength()
+    times = [k * 1e-3 for k in range(62_000)]
+    seen = {ticking.sees(t, 60.5 if 60.0 <= t < 60.5 else t) for t in times}
+    assert seen == {1.0}
+
+
 def test_a_run_on_a_board_with_a_slow_tick_is_stopped_with_its_length():
     scene = Scene().started()
     scene.beside.clock = lambda: 2.0 * scene.rig.sample.time

@@ -8,17 +8,44 @@ JITTER, LEAST = 0.03, 0.5
 """What a sample may be late by on its way [s], and the least time over which clocks are compared [s]."""
 
 
+Sample = tuple[float, float]
+"""Times of a sample by the board's clock and by the host's [s]."""
+
+
 class TickLength:
-    """Board's time and host's time since the first sample; late samples alone are not a slow tick."""
+    """Board's time and host's time since the first sample, and lately; late samples alone are not a slow tick.
+
+    What a clock may be off by grows with the time since the first sample, so that a tick that changes later is not seen
+    there for a long time. The promptest samples of successive pieces of `LEAST` show it: they are apart by more than
+    what is allowed twice in a row.
+    """
 
     def __init__(self) -> None:
-        self._first: tuple[float, float] | None = None
+        self._first: Sample | None = None
+        self._before: Sample | None = None
+        self._promptest: Sample = (0.0, 0.0)
+        self._end, self._off = 0.0, False
 
     def sees(self, board: float, host: float) -> float:
         """Take the times of a sample [s]; the tick's length over what it should be, 1 while nothing is wrong."""
+        now = board, host
         if self._first is None:
-            self._first = board, host
-        passed, truly = board - self._first[0], host - self._first[1]
-        if max(passed, truly) < LEAST or abs(truly - passed) < JITTER + OFF * max(passed, truly) or passed <= 0:
+            self._first, self._promptest, self._end = now, now, host + LEAST
+        lately = 1.0
+        if host >= self._end:
+            length = 1.0 if self._before is None else _length(self._before, self._promptest)
+            lately = length if self._off else 1.0
+            self._before, self._promptest, self._end, self._off = self._promptest, now, host + LEAST, length != 1.0
+        elif host - board < self._promptest[1] - self._promptest[0]:
+            self._promptest = now
+        if max(board - self._first[0], host - self._first[1]) < LEAST:
             return 1.0
-        return truly / passed
+        return max(_length(self._first, now), lately, key=lambda length: abs(length - 1.0))
+
+
+def _length(since: Sample, now: Sample) -> float:
+    """Of a tick in between, over what it should be; 1 where jitter and two sound clocks explain the difference."""
+    passed, truly = now[0] - since[0], now[1] - since[1]
+    if passed <= 0 or abs(truly - passed) < JITTER + OFF * max(passed, truly):
+        return 1.0
+    return truly / passed
