@@ -54,8 +54,8 @@ def test_the_verdict_counts_faults_and_warnings(severities, verdict, sound):
     assert (page.verdict, page.sound) == (verdict, sound)
     assert page.title == "What looks wrong with run.csv"
     assert page.detail == "1234 samples over 5.679 s, rig: furuta."
-    assert [p.key for p in page.parts] == [
-        *(f"finding-{i + 1}" for i in range(len(severities))), "checked", "unchecked"
+    assert [p.key or p.title for p in page.parts] == [
+        *(f"finding-{i + 1}" for i in range(len(severities))), "Checked", "Not checked"
     ]  # fmt: skip
     assert page.parts[-2].content == (Points((f"{KINDS['jump']}; {KINDS['spike']}",)),)
     assert page.parts[-1].content == (Facts(((KINDS["sign"], "nobody said"),)),)
@@ -65,17 +65,29 @@ def test_a_finding_is_told_with_its_evidence_its_key_and_its_picture():
     part = chapter(diagnosis(finding()), log=Path("run.csv")).parts[0]
     facts, code, picture = part.content
     assert part.title == "fault: jump"
-    assert facts == Facts((("Found", "'x' jumps."), ("Evidence", "jump 12.35 mm, jumps 2."), ("What to do", "Cut it.")))
+    assert facts == Facts((("Finding", "'x' jumps."), ("Evidence", "jump 12.35 mm, jumps 2."),
+                            ("What to do", "Cut it.")))  # fmt: skip
     assert code == Code("window = 1")
     assert isinstance(picture, Picture)
     assert picture.caption.startswith("Dashed lines point at instants")
     bare = chapter(
         diagnosis(finding(advice="", key="", evidence={}, marks=(), spans=())), log=Path("a.csv")
     ).parts[0]  # fmt: skip
-    assert bare.content[0] == Facts((("Found", "'x' jumps."),))
+    assert bare.content[0] == Facts((("Finding", "'x' jumps."),))
     assert bare.content[1].caption == "The columns it is about."
     assert len(chapter(diagnosis(finding(panels=())), log=Path("a.csv")).parts[0].content) == 2
-    assert chapter(diagnosis(unchecked={}), log=Path("a.csv")).parts[-1].content == ("Nothing.",)
+    checks = chapter(diagnosis(checked=(), unchecked={}), log=Path("a.csv")).parts
+    assert [p.content for p in checks] == [(Points(("nothing",)),), ("Nothing.",)]
+
+
+@pytest.mark.parametrize("name", ["![x](y)", "a](b", "[x]", "x|y", "## x", "- x"])
+def test_a_column_s_name_is_no_markup(name):
+    """Names of columns stand in sentences, reasons and file names, and a log may name them anything."""
+    sentence = f"{name} jumps."
+    page = chapter(diagnosis(finding(sentence=sentence), unchecked={"sign": sentence}, rig=name), log=Path("a.csv"))
+    assert page.parts[0].content[0].pairs[0] == ("Finding", sentence)
+    assert page.parts[-1].content == (Facts(((KINDS["sign"], sentence),)),)
+    assert page.detail.endswith(f"rig: {name}.")
 
 
 def test_what_to_type_next_names_log_rig_and_page():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +10,8 @@ import numpy as np
 
 from upright.diagnosis.findings import KINDS, Diagnosis, Finding
 from upright.report.drawing import CYCLE, GREY, ORANGE, decimated, figure, hide_inner_times, styled
-from upright.report.page import Block, Chapter, Code, Facts, Part, Picture, Points, Step
-from upright.report.symbols import typed
+from upright.report.page import Block, Chapter, Code, Facts, Part, Picture
+from upright.report.prose import chapter_of
 
 if TYPE_CHECKING:
     from upright.report.drawing import Figure
@@ -28,26 +29,19 @@ def chapter(diagnosis: Diagnosis, *, log: Path, rig: str = "", page: bool = True
     page : bool
         Whether a page with the pictures is written anyhow, so that none need be proposed.
     """
-    wrong = len(diagnosis.wrong)
     unchecked = tuple((KINDS[k], why) for k, why in diagnosis.unchecked.items())
-    return Chapter(
-        title=f"What looks wrong with {Path(diagnosis.file).name}",
-        verdict="Nothing wrong found." if not wrong else f"{wrong} thing{'s look' if wrong > 1 else ' looks'} wrong.",
-        detail=f"{diagnosis.samples} samples over {diagnosis.duration:.4g} s, rig: {diagnosis.rig or 'not specified'}.",
-        sound=not wrong,
-        parts=(
-            *(_part(f, f"finding-{i}") for i, f in enumerate(diagnosis.findings, start=1)),
-            Part(
-                title="Looked for", key="checked", content=(Points(("; ".join(KINDS[k] for k in diagnosis.checked),)),)
-            ),
-            Part(title="Not looked for", key="unchecked", content=(Facts(unchecked) if unchecked else "Nothing.",)),
-        ),
-        steps=tuple(_next_steps(diagnosis, log, rig, page)),
-    )
+    written = chapter_of(
+        __name__, diagnosis=diagnosis, log=log, rig=rig, page=page, kinds=KINDS, file=Path(diagnosis.file).name,
+        placed={
+            "findings": [_part(f, f"finding-{i}") for i, f in enumerate(diagnosis.findings, start=1)],
+            "unchecked": (Facts(unchecked),),
+        },
+    )  # fmt: skip
+    return replace(written, sound=not diagnosis.wrong)
 
 
 def _part(finding: Finding, key: str) -> Part:
-    facts = [("Found", finding.sentence)]
+    facts = [("Finding", finding.sentence)]
     if finding.evidence:
         evidence = (f"{name.rpartition(' [')[0]} {value:.4g}{_unit(name)}" for name, value in finding.evidence.items())
         facts.append(("Evidence", f"{', '.join(evidence)}."))
@@ -73,22 +67,6 @@ def _part(finding: Finding, key: str) -> Part:
 def _unit(name: str) -> str:
     unit = name.rpartition("[")[2].rstrip("]")
     return "" if unit in ("1", "") else f" {unit}"
-
-
-def _next_steps(diagnosis: Diagnosis, log: Path, rig: str, page: bool) -> list[Step]:
-    steps: list[Step] = []
-    again = f"upright doctor {typed(log)}"
-    if diagnosis.findings and not page:
-        command = f"{again}{f' --rig {typed(rig)}' if rig else ''} -o {typed(f'{log.stem}-doctor.html')}"
-        steps.append(Step("See the pictures.", command))
-    if not rig and diagnosis.rigs:
-        choice = " or ".join(diagnosis.rigs)
-        sentence = f"Name the rig, so that signs and scales can be checked; these columns would suit {choice}."
-        steps.append(Step(sentence, f"{again} --rig {diagnosis.rigs[0]}"))
-    if rig.endswith((".toml", ".json")):
-        return steps
-    keys = ", with the keys named above" if any(finding.key for finding in diagnosis.findings) else ""
-    return [*steps, Step(f"Write a study{keys}.", f"upright init {typed(log)} -o study.toml")]
 
 
 @styled
