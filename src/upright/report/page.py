@@ -143,6 +143,7 @@ class Picture:
             return drawn.svg(self.name)
         from upright.report.drawing import svg
 
+        self.__dict__["_drawn"] = drawn  # dearer than its markup: a phone's is of the same figure
         return svg(drawn, self.name)
 
     @cached_property
@@ -152,8 +153,11 @@ class Picture:
             return self.phone
         from upright.report.drawing import narrowed, svg
 
-        drawn = self.draw()
-        text = svg(drawn, f"{self.name}-narrow") if narrowed(drawn) else ""
+        wide = len(self.svg)
+        drawn = self.__dict__.pop("_drawn")
+        if wide > 2 * LARGEST_NARROW or not narrowed(drawn):
+            return ""
+        text = svg(drawn, f"{self.name}-narrow")
         return text if len(text) < LARGEST_NARROW else ""
 
 
