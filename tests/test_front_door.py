@@ -70,6 +70,7 @@ def test_a_fit_predicts_another_swing_and_knows_a_different_rig(fit):
     assert len(same.plot().axes) >= 2
 
 
+@pytest.mark.slow
 def test_a_fit_goes_to_a_file_that_the_commands_read(fit, tmp_path):
     from upright.study.stored_fit import read_fit
 

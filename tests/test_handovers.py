@@ -148,6 +148,7 @@ def test_a_rig_in_memory_is_regulated_and_swung_up(form, forms, tmp_path):
     assert swung.numbers
 
 
+@pytest.mark.slow
 def test_a_shaft_in_memory_is_tracked(tmp_path):
     shaft = up.chain(2, "torsional")(J_1=0.0108, J_2=0.0103, k_12=1.37, c_1=0.007, c_2=0.001)
     done = up.track(shaft, limit=0.5, period="0.884 ms", counts=16_000, sets=1, out=tmp_path)
@@ -316,7 +317,7 @@ CALLS = {
 }
 
 
-@pytest.mark.parametrize("verb", CALLS)
+@pytest.mark.parametrize("verb", [pytest.param(v, marks=pytest.mark.slow) if v == "regulate" else v for v in CALLS])
 def test_whatever_a_verb_is_given_it_answers_or_says_in_a_sentence(verb, tmp_path_factory, monkeypatch):
     monkeypatch.chdir(tmp_path_factory.mktemp("anything"))
 

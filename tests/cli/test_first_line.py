@@ -172,6 +172,7 @@ def test_an_old_fit_without_a_verdict_counts_as_not_trusted(said, tmp_path):
     assert f"Verdict: {REFUSED}" in done.stdout
 
 
+@pytest.mark.slow
 def test_an_old_design_that_says_nothing_of_its_fit_counts_as_not_trusted(tmp_path):
     upright("design", fit_of("furuta", tmp_path, TRUSTED), *CLOSED, "-o", tmp_path)
     content = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))

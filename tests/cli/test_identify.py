@@ -101,6 +101,7 @@ def test_a_fit_whose_motion_runs_away_is_written_with_its_reason(bench):
     assert run("identify", "study.toml", "-o", "out", "--strict").exit_code == 3
 
 
+@pytest.mark.slow
 def test_a_fitted_model_scores_another_study(fitted):
     outcome = run("predict", "out/fit.json", "study.toml", "--json", "-o", "scores")
     assert outcome.exit_code == 0, outcome.output
@@ -133,6 +134,7 @@ def test_the_tail_of_a_fitted_log_is_a_prediction(bench):
         assert bool(json.loads(outcome.stdout)["seen_in_the_fit"]) == seen
 
 
+@pytest.mark.slow
 def test_prediction_needs_no_parameters_in_its_study(fitted):
     folder = fitted[0]
     head, _, tail = STUDY.partition("[parameters]")
@@ -245,6 +247,7 @@ def test_a_mistake_is_answered_in_one_sentence(bench, arguments, says):
     assert outcome.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_prediction_that_falls_short_exits_with_3(fitted):
     """A thread a tenth longer swings 5 % slower: after nine swings it is half a swing late."""
     slower = 0.02 * np.cos(W / np.sqrt(1.1) * T)
@@ -259,6 +262,7 @@ def test_a_prediction_that_falls_short_exits_with_3(fitted):
     assert told["runs"]["slow"]["inside"]["theta"] < 70
 
 
+@pytest.mark.slow
 def test_a_larger_swing_is_named_as_extrapolation(fitted):
     np.savetxt("wide.csv", np.column_stack([T, swing(T, 0.04)]), "%.12g", ",", header="t,theta", comments="")
     study = STUDY.split("[[runs]]")[0] + '[[runs]]\nlabel = "wide"\nfile = "wide.csv"\n'
@@ -268,6 +272,7 @@ def test_a_larger_swing_is_named_as_extrapolation(fitted):
     assert "extrapolates" not in run("predict", "out/fit.json", "study.toml").stdout
 
 
+@pytest.mark.slow
 def test_a_fit_of_an_older_version_predicts_without_bands(fitted):
     path = fitted[0] / "out" / "fit.json"
     old = json.loads(path.read_text(encoding="utf-8"))

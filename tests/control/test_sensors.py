@@ -70,7 +70,7 @@ def test_an_odd_rig_is_not_a_lying_encoder(make, odd):
     assert checked(ODD[odd](make_rig(make, 3)), make).sound
 
 
-@pytest.mark.parametrize(("make", "travel"), [("linear", 0.1), ("furuta", 1.0)])
+@pytest.mark.parametrize(("make", "travel"), [("linear", 0.1), pytest.param("furuta", 1.0, marks=pytest.mark.slow)])
 def test_a_short_rail_is_kept_to_and_asked_all_the_same(make, travel):
     model, rig = make_rig(make), replace(make_rig(make, 1), scales=(1.1, 1.0))
     blind = probe(model, design_swing_up(model, travel=travel))

@@ -52,7 +52,7 @@ def watched(make, shown, seed=3, seconds=2.5):
     return watch.over(seen, run.u), run
 
 
-@pytest.mark.parametrize("make", MAKES)
+@pytest.mark.parametrize("make", ["furuta", pytest.param("linear", marks=pytest.mark.slow)])
 def test_the_watch_speaks_before_the_fall(make):
     first = make_rig(make).plant.coordinates[0].name
     for shown, what in (
@@ -105,7 +105,7 @@ def test_a_watched_drive_stops_pushing():
 
 
 @pytest.mark.parametrize("make", ["furuta", "linear"])
-@pytest.mark.parametrize("tilt", [0.03, 0.08])
+@pytest.mark.parametrize("tilt", [0.03, pytest.param(0.08, marks=pytest.mark.slow)])
 def test_a_sound_loop_that_has_come_to_rest_is_not_suspected(make, tilt):
     """Close to rest dry friction holds what the filters take for free; evidence of that adds up over seconds."""
     model = make_rig(make)
@@ -234,24 +234,22 @@ def test_dry_friction_as_large_as_may_be_is_no_evidence(make):
     assert watch.odds.max() < min(BOUNDS.values())
 
 
-@pytest.mark.parametrize("make", MAKES)
-@pytest.mark.parametrize("rate", [0.3, 0.5])
-def test_a_zero_that_drifts_is_found_when_the_sum_of_its_excess_says(make, rate):
+RATES = (math.radians(0.3), math.radians(0.5))
+
+
+@pytest.mark.parametrize("make", ["furuta", pytest.param("linear", marks=pytest.mark.slow)])
+def test_a_zero_that_drifts_is_found_when_the_sum_of_its_excess_says_and_a_frame_out_of_level_never(make):
     """Page: a ramp r t passes the bound B at B/r, and its excess adds up to S after sqrt(2 S/r) more."""
-    rig, speed = PROMPT[make], math.radians(rate)
-    t = np.arange(round(12.0 / rig.period)) * rig.period
-    alarm = Watch(rig).over(np.column_stack([0 * t, speed * t]), 0 * t)
-    assert alarm.what[0] == Suspicion(name="theta", factor=1.0)
-    expected = OUT_OF_TRUE / speed + math.sqrt(2 * DRIFTED / speed)
-    assert alarm.sample[0] * rig.period == pytest.approx(expected, abs=5 / CORNER)
-
-
-@pytest.mark.parametrize("make", MAKES)
-def test_a_frame_out_of_level_is_no_zero_that_drifts(make):
     rig = PROMPT[make]
     t = np.arange(round(20.0 / rig.period)) * rig.period
-    lean = 0.95 * OUT_OF_TRUE * (1 - np.exp(-t / 0.5))
-    assert Watch(rig).over(np.column_stack([0 * t, lean]), 0 * t).sample[0] == -1
+    level = 0.95 * OUT_OF_TRUE * (1 - np.exp(-t / 0.5))
+    lean = np.column_stack([*(rate * t for rate in RATES), level])
+    alarm = Watch(rig).over(np.stack([0 * lean, lean], axis=1), 0 * lean)
+    assert alarm.what[:2] == (Suspicion(name="theta", factor=1.0),) * 2
+    for rate, sample in zip(RATES, alarm.sample[:2], strict=True):
+        expected = OUT_OF_TRUE / rate + math.sqrt(2 * DRIFTED / rate)
+        assert sample * rig.period == pytest.approx(expected, abs=5 / CORNER)
+    assert alarm.sample[2] == -1
 
 
 @pytest.mark.parametrize("make", MAKES)

@@ -80,7 +80,7 @@ def test_counts_of_both_encoders_follow_from_gravity_and_the_period_of_large_swi
 
 
 @pytest.mark.parametrize("dead_zone", [0.0, 0.1, 0.4])
-@pytest.mark.parametrize("share", [1.0, 0.5])
+@pytest.mark.parametrize("share", [1.0, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_gain_and_dead_zone_of_the_drive_follow_beside_each_other(dead_zone, share):
     t, q, u = moved(dead_zone, share * GAIN)
     found = check_wiring(RIG, t, counted(q, 1.0, 1.0), u)

@@ -182,6 +182,7 @@ def test_back_emf_is_in_the_linear_model(study):
     np.testing.assert_allclose(x - plant.state("hanging"), expected, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_data_sheet_is_taken_by_name_and_told(tmp_path):
     (tmp_path / "rig.toml").write_text(without("limit", "servo_period", "travel"), encoding="utf-8")
     done = run(tmp_path / "rig.toml", tmp_path, vendor="ECP 210")

@@ -22,7 +22,11 @@ def dead(built, moment, way):
     return death
 
 
-@pytest.mark.parametrize(("moment", "way"), BRIEF, ids=[f"{moment.name}: {way}" for moment, way in BRIEF])
+@pytest.mark.parametrize(
+    ("moment", "way"),
+    [BRIEF[0], *(pytest.param(*case, marks=pytest.mark.slow) for case in BRIEF[1:])],
+    ids=[f"{moment.name}: {way}" for moment, way in BRIEF],
+)
 def test_the_drive_goes_off_by_the_interlock_that_is_made_for_it(built, moment, way):
     death = dead(built, moment, way)
     # only the watchdog is left where the loop is killed, and it waits for its time

@@ -78,7 +78,7 @@ def apart(case: str, runs: Sequence[Run], *passed_over: str) -> list[str]:
     return [path for path in found if not path.startswith(ignored)]
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) if c == "filtered" else c for c in CASES])
 def test_a_fit_does_not_depend_on_when_the_clock_began(case):
     clocks = [f".runs.{label}.t" for label in "abc"]
     assert apart(case, [replace(run, t=run.t + LATER) for run in CASES[case][1]], *clocks) == []

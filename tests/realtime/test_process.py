@@ -248,7 +248,7 @@ def orphaned(folder, event):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("event", ["unpacked", "call 2000 deaf"])
+@pytest.mark.parametrize("event", ["unpacked", pytest.param("call 2000 deaf", marks=pytest.mark.slow)])
 def test_a_dead_parent_never_leaves_the_drive_on(tmp_path, event):
     command, enabled, _, driven = orphaned(tmp_path, event)
     assert (command, enabled, driven) == (0.0, 0, 0)

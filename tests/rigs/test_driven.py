@@ -97,7 +97,7 @@ def test_a_dead_encoder_stops_the_rig_within_its_travel(seed, channel):
 
 
 @pytest.mark.parametrize("tap", [0.3, 0.6, 1.0, 1.5])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_a_sound_rig_that_is_tapped_at_rest_is_not_stopped(seed, tap):
     """10 of 62 such runs were, as an encoder that shows not a single count (20 ms of stillness inside friction)."""
     scene = Scene(truth=nonideal(make_rig("furuta", seed), seed)).started(tilt=0.01)

@@ -17,7 +17,7 @@ VERBS = {
 }
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", [pytest.param("regulate", marks=pytest.mark.slow), "swing_up"])
 def test_no_file_is_left_where_no_folder_is_named(verb, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer = VERBS[verb]()
@@ -28,7 +28,7 @@ def test_no_file_is_left_where_no_folder_is_named(verb, tmp_path, monkeypatch):
     answer.plot()
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", [pytest.param("regulate", marks=pytest.mark.slow), "swing_up"])
 def test_files_are_written_into_the_folder_that_is_named(verb, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer = VERBS[verb](out=tmp_path / "here")

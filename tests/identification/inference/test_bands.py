@@ -46,7 +46,7 @@ def driven(seed: int) -> tuple[GreyBox, list[Run]]:
     return rig(Furuta, known, {"J_d": 0.01, "b_1": 4e-3, "b_2": 3e-4, "b_1c": 2e-3}), [one, other]
 
 
-@pytest.mark.parametrize("twin", [rubbed, driven])
+@pytest.mark.parametrize("twin", [rubbed, pytest.param(driven, marks=pytest.mark.slow)])
 def test_nine_of_ten_unseen_samples_lie_inside(twin) -> None:
     """Over twins, whatever one of them comes to; 85 % leaves 5 % to chance, as was asked."""
     shares: list[float] = []

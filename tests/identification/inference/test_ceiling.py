@@ -93,6 +93,7 @@ def test_where_the_record_hardly_moves_a_single_sample_is_left() -> None:
     assert ceilings(problem, 0, problem.start, [1])[0, 0] < ENOUGH
 
 
+@pytest.mark.slow
 def test_the_true_model_misses_by_what_its_start_state_is_unknown() -> None:
     """A Furuta pendulum balanced by its loop, moved by no force that is not logged, readings with white noise."""
     sigma = QUANTUM / math.sqrt(12)

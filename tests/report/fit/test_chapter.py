@@ -50,6 +50,7 @@ def test_the_page_says_what_a_reader_asks_first(fit, written):
     assert "upright predict out/fit.json" in page.prose
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_from_anywhere(fit, written):
     text, page = written(fit)
     links = [v for _, k, v in page.attributes if k in ("src", "href", "xlink:href", "data", "action")]
@@ -85,6 +86,7 @@ def test_the_same_fit_writes_the_same_bytes(fit, written):
     assert written(fit)[0] == written(fit)[0]
 
 
+@pytest.mark.slow
 def test_names_from_a_log_cannot_become_markup(changed, written, swing):
     evil = '</text><script>alert("x")</script> $\\frac{1}{$ <b>'
     fit = changed(runs={evil: swing()}, verdict=evil, warnings=(evil,), unseen=(evil,), per_run={evil: {}})
@@ -121,11 +123,13 @@ def test_a_fit_of_nothing_is_a_page_too(changed, written):
     assert "No run was scored" in page.prose
 
 
+@pytest.mark.slow
 def test_without_a_predicted_run_the_page_asks_for_one(changed, written, swing):
     _, page = written(changed(runs={"release": swing()}))
     assert 'role = "predict"' in page.prose
 
 
+@pytest.mark.slow
 def test_a_model_that_ran_away_is_drawn_all_the_same(changed, written, swing):
     wild = swing(n=300)
     model = wild.simulated.copy()
@@ -137,6 +141,7 @@ def test_a_model_that_ran_away_is_drawn_all_the_same(changed, written, swing):
     assert "worse than by its mean" in page.prose
 
 
+@pytest.mark.slow
 def test_a_doubtful_fit_says_so_before_its_verdict(changed, written):
     _, page = written(changed(trusted=False, interrupted=True))
     assert "Do not rely on this model yet" in page.prose
