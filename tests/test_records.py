@@ -102,6 +102,14 @@ def test_period_is_the_median_step() -> None:
 
 @settings(deadline=None)  # the first call pays for an import
 @given(records())
+def test_a_record_holds_and_lists_the_columns_of_its_data_frame(record: Record) -> None:
+    frame = record.to_pandas()
+    assert [name in record for name in (*record, "nothing")] == [name in frame for name in (*record, "nothing")]
+    assert list(record) == [name for name in frame if name in record.signals]
+
+
+@settings(deadline=None)
+@given(records())
 def test_pandas_gives_back_every_bit(record: Record) -> None:
     assert same(Record.from_pandas(record.to_pandas()), record)
 

@@ -12,7 +12,7 @@ import csv
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -145,6 +145,10 @@ class Record(Shown):
 
     def __len__(self) -> int:
         return self.t.size
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of all columns, as a data frame gives them: ``"theta" in log``."""
+        return iter(self.signals)
 
     def __getitem__(self, name: str) -> Array:
         """Samples (N,) of one column, in the unit of the log.
