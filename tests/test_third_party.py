@@ -141,7 +141,7 @@ def test_a_law_and_a_rig_are_exported_in_its_forms(installed, tmp_path):
     assert done.numbers["to"] == "its-rig"
     with pytest.raises(up.BadInput, match="limit is that of the fit"):
         up.export(PENDULUM, to="its-rig", out=tmp_path, limit=1.0)
-    with pytest.raises(up.BadInput, match=r"there is no 'itz'; did you mean 'its'"):
+    with pytest.raises(up.BadInput, match=r"got 'itz'; did you mean 'its'"):
         up.export(PENDULUM, to="itz", out=tmp_path)
 
 

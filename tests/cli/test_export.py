@@ -81,7 +81,7 @@ def test_a_command_without_a_limit_is_warned_of(tmp_path):
         ({"readings": ...}, "lacks readings"),
         ({"law": {"A": "x"}}, "lacks the law's kind"),
         ({"law": {"kind": "linear", "A": "x"}}, "the values are no law's"),
-        ({"law": ...}, "is no design.json"),
+        ({"law": ...}, "is not a design.json"),
     ],
 )
 def test_what_is_no_law_to_be_run_is_refused(change, words, designed, tmp_path):
@@ -98,7 +98,7 @@ def test_what_is_no_law_to_be_run_is_refused(change, words, designed, tmp_path):
 def test_a_fit_is_told_from_a_design(tmp_path):
     path = tmp_path / "fit.json"
     path.write_text('{"plant": "furuta", "parameters": {}}')
-    assert "goes to gymnasium, mjcf or fmu" in upright("export", path, "--to", "c").stderr
+    assert "exported to gymnasium, mjcf or fmu" in upright("export", path, "--to", "c").stderr
 
 
 def test_what_design_prints_as_json_is_taken_too(designed, tmp_path):

@@ -81,7 +81,7 @@ def test_a_program_says_what_its_reader_has_to_know():
         *filter(None, [harmless(MADE.basis.first_line())]),
         "Call it every 0.01 s, with readings taken just before, and put the command out at once.",
         "Readings: x [m], theta; at rest 0.0, 1.5.",
-        "Commands: u [V]; none beyond 6.0, in steps of 0.5.",
+        "Commands: u [V]; limited to 6.0 either way, in steps of 0.5.",
         "References: goal, as deviations from rest.",
         "States from readings: differences.",
         "Designed for commands that act 1 sample late in all.",
@@ -158,14 +158,14 @@ def test_a_design_is_read_signal_by_signal():
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ([], "no design.json; it needs the keys law, K and period"),
-        ({"law": {}, "K": []}, "no design.json; it needs the keys law, K and period"),
-        ({k: v for k, v in DESIGN.items() if k not in ("readings", "margins")}, "x lacks readings, margins, as older"),
+        ([], "not a design.json; it needs the keys law, K and period"),
+        ({"law": {}, "K": []}, "not a design.json; it needs the keys law, K and period"),
+        ({k: v for k, v in DESIGN.items() if k not in ("readings", "margins")}, "x lacks readings, margins; an older"),
         (
             DESIGN | {"margins": None, "verdict": "It falls."},
-            "the loop of x falls, so its law is not exported: It falls",
+            "the loop of x is unstable, so its law is not exported: It falls",
         ),
-        (DESIGN | {"law": {"A": [[0.5]]}}, "x lacks the law's kind, as older"),
+        (DESIGN | {"law": {"A": [[0.5]]}}, "x lacks the law's kind; an older"),
         (DESIGN | {"law": {"kind": "linear", "A": [[0.5]]}}, "the values are no law's"),
         (DESIGN | {"readings": DESIGN["readings"][:1]}, "needs matrices for 1 readings"),
     ],
@@ -199,8 +199,8 @@ def test_a_swing_up_is_read_with_its_own_limit_period_and_signs():
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ([], "x is no swing_up.json with a law; write it again with"),
-        ({k: v for k, v in SWING.items() if k != "limit"}, "x is no swing_up.json with a law"),
+        ([], "x is not a swing_up.json with a law; write it again with"),
+        ({k: v for k, v in SWING.items() if k != "limit"}, "x is not a swing_up.json with a law"),
         (SWING | {"swing_up": None, "verdict": "It fell."}, "of x did not end upright, so it is not exported: It fell"),
         (SWING | {"swing_up": {"held": False}}, "did not end upright"),
         (SWING | {"readings": DESIGN["readings"][:1]}, r"x does not hold a law \(it needs a rule of 1 readings\)"),

@@ -288,8 +288,8 @@ def test_a_command_is_held_for_a_tenth_of_a_millisecond_to_a_second(fit, period,
 @pytest.mark.parametrize(
     ("lanes", "options", "words"),
     [
-        (0, {}, "at least one lane, got 0"), (1, {"travel": 0.0}, "travel of an environment lies above 0"),
-        (1, {"limit": 1e9}, r"limit of an environment lies above 0 and below 1e9, got 1e\+09"),
+        (0, {}, "at least one rig, got 0"), (1, {"travel": 0.0}, "travel of an environment must be above 0"),
+        (1, {"limit": 1e9}, r"limit of an environment must be above 0 and below 1e9, got 1e\+09"),
     ],
 )  # fmt: skip
 def test_numbers_out_of_reach_are_refused(fit, lanes, options, words):

@@ -143,7 +143,7 @@ def test_fmpy_s_validator_finds_nothing_and_its_simulation_agrees(tmp_path):
 )  # fmt: skip
 def test_what_has_no_counterpart_in_c_is_refused_by_its_text(line):
     """Another program than the kernel's text would be worse than none."""
-    with pytest.raises(BadInput, match="does not write as C; the target gymnasium") as refused:
+    with pytest.raises(BadInput, match="cannot be translated to C; the target gymnasium") as refused:
         as_c(f"def run_1(n):\n    {line}\n", "run_1", {}, {})
     assert line.partition("n = ")[2].split(" ")[0] in str(refused.value)
 
@@ -228,5 +228,5 @@ def test_a_unit_remembers_the_delay_and_forty_time_constants(delay, lag, kept, t
 
 def test_a_drive_as_late_as_a_minute_and_more_is_refused(tmp_path):
     entries = {"delay": {"value": 100.0, "unit": "s", "source": "known"}}
-    with pytest.raises(BadInput, match="remember 100003 commands, and 100000 is the most; are they in seconds"):
+    with pytest.raises(BadInput, match="remember 100003 commands, more than 100000; are they in seconds"):
         unit_of(identified(tmp_path, SMOOTH["pendulum"], **entries))

@@ -432,7 +432,7 @@ def test_the_module_holds_the_simulated_rig_with_the_kernel_s_commands(tmp_path)
     [
         (None, "takes design.json"),
         (Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[1.0]]), "sample period"),
-        (Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.ones((1, 1, 7)), period=0.1), "7 lanes"),
+        (Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.ones((1, 1, 7)), period=0.1), "a batch of 7"),
         ([1.0, 2.0], "state_feedback"),
     ],
 )

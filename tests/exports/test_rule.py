@@ -181,10 +181,10 @@ def test_the_verb_writes_a_sketch_and_says_what_a_mega_does_not(tmp_path):
 @pytest.mark.parametrize(
     ("rule", "how", "sentence"),
     [
-        (replace(BARE, measured=()), {"to": "c"}, r"needs its readings' names: dataclasses.replace\(rule, measured="),
+        (replace(BARE, measured=()), {"to": "c"}, r"needs the names of its readings: replace\(rule, measured="),
         (replace(BARE, period=None), {"to": "c"}, "needs its sample period"),
-        (replace(BARE, parameters=np.ones((1, 2))), {"to": "c"}, "given for 2 lanes"),
-        (BARE, {"to": "matlab"}, "a rule goes to c, arduino, python in double precision.* got matlab"),
+        (replace(BARE, parameters=np.ones((1, 2))), {"to": "c"}, "a batch of 2"),
+        (BARE, {"to": "matlab"}, "a rule is exported to c, arduino, python, in double precision only.* got matlab"),
         (BARE, {"to": "c", "single": True}, "got single"),
         (replace(MIXED, measured=("theta",)), {"to": "c"}, "the rule stops at readings of zero: ValueError"),
     ],
@@ -207,7 +207,7 @@ def held_out(t, y, r, z, p):
 @pytest.mark.parametrize("function", [nested, held_out])
 def test_what_c_has_no_words_for_goes_to_python_only(function, tmp_path):
     rule = Rule(function=function, measured=("x",), period=0.01)
-    with pytest.raises(BadInput, match=r"which this program does not write as C: .* or take the target python"):
+    with pytest.raises(BadInput, match=r"which cannot be translated to C.* or export it to python"):
         written(rule, "c", tmp_path)
     assert PASSED in said(sys.executable, "-I", written(rule, "python", tmp_path) / "law.py")
 

@@ -40,7 +40,7 @@ def test_limit_units_and_the_zero_of_encoders_are_in_the_program(swing: tuple[An
     answer, _ = swing
     written = up.export(answer, to="c", out=tmp_path)
     head = (tmp_path / "law.h").read_text(encoding="utf-8")
-    assert f"none beyond {answer.value.law.limit!r}" in head
+    assert f"limited to {answer.value.law.limit!r} either way" in head
     assert "psi [rad], theta [rad]" in head
     assert "u [V]" in head
     assert "zero them at rest, a pendulum hanging, before a run" in head
@@ -56,7 +56,7 @@ def test_a_swing_up_that_was_not_caught_is_no_program(swing: tuple[Any, Path], t
         up.export(file, to="c", out=tmp_path)
     del content["rule"]  # as older versions wrote it
     file.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(BadInput, match=r"no swing_up\.json with a law; write it again with `upright swing-up"):
+    with pytest.raises(BadInput, match=r"not a swing_up\.json with a law; write it again with `upright swing-up"):
         up.export(file, to="c", out=tmp_path)
 
 

@@ -23,12 +23,12 @@ def test_a_law_is_written_with_how_it_tests_itself(tmp_path):
     assert done.numbers["period"] == 0.1
     assert (done.numbers["limit"], done.numbers["samples"], done.numbers["to"]) == (2.0, 48, "python")
     assert done.chapter.verdict.endswith(
-        "this law is written for python; 48 samples are replayed and compared bit for bit."
+        "this law is written for python; its self-test compares 48 samples bit for bit."
     )
     assert done.files == (tmp_path / "law.py",)
     assert done.value == (str(tmp_path / "law.py"),)
     assert not done.chapter.warnings
-    assert any("none beyond 2.0, in steps of 0.25" in s for s in done.chapter.parts[0].content[0].sentences)
+    assert any("limited to 2.0 either way, in steps of 0.25" in s for s in done.chapter.parts[0].content[0].sentences)
 
 
 def test_a_law_without_a_limit_is_written_with_a_warning(tmp_path):
@@ -44,18 +44,18 @@ def test_single_precision_is_said_to_miss_by_as_much_as_it_may(tmp_path):
 
     done = up.export(LAW, to="c", single=True, out=tmp_path)
     assert done.numbers["single_precision_misses"] == pytest.approx(0.25, rel=1e-3)
-    assert "48 samples are replayed and may miss by 0.25 in single precision" in done.chapter.verdict
+    assert "its self-test compares 48 samples to within 0.25" in done.chapter.verdict
     assert not done.chapter.warnings
     (warned,) = up.export(replace(LAW, command_resolution=0.0), to="c", single=True, out=tmp_path).chapter.warnings
-    assert "which no converter hides; a slower period moves it less" in warned
+    assert "with no converter step; a longer period reduces it" in warned
 
 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "does not exist; `upright design"), ("{", "is no design.json; `upright design"),
-        (json.dumps({"plant": "x", "parameters": {}}), "is a fit, and a law is what"),
-        ("[]", "is no design.json; it needs the keys"),
+        (None, "does not exist; `upright design"), ("{", "is not a design.json; `upright design"),
+        (json.dumps({"plant": "x", "parameters": {}}), "is a fit, not a law"),
+        ("[]", "is not a design.json; it needs the keys"),
     ],
 )  # fmt: skip
 def test_a_file_that_holds_no_law_is_refused(content, said, tmp_path):

@@ -95,7 +95,7 @@ class SampledController:
             f"Readings: {', '.join(units)}" + (f"; at rest {', '.join(rest)}." if rest else "."),
             *filter(None, [self._zeroing()]),
             f"Commands: {', '.join(self.commands)}{unit}; "
-            + (f"none beyond {self.law.limit!r}" if math.isfinite(self.law.limit) else "NO LIMIT SPECIFIED")
+            + (f"limited to {self.law.limit!r} either way" if math.isfinite(self.law.limit) else "NO LIMIT SPECIFIED")
             + (f", in steps of {self.converter.max():g}." if self.converter.any() else ", not rounded."),
         ]
         if self.references:
@@ -120,12 +120,14 @@ def of_law(law: Any) -> SampledController:
     """
     if not isinstance(law, Law | Rule):
         raise BadInput(
-            f"export takes design.json or its folder, what design(...) answers, a Law or a Rule, got "
+            f"export takes design.json or its folder, the answer of design(...), a Law or a Rule, got "
             f"{type(law).__name__}; for gains alone make a Law: upright.laws.state_feedback(K, period)."
         )
     lanes = max(law.widths().values())
     if lanes > 1:
-        raise BadInput(f"one law can be exported, and this one is given for {lanes} lanes; take one: law.of_lanes(...)")
+        raise BadInput(
+            f"a single law is exported, and this one is a batch of {lanes}; take one of them: law.of_lanes(...)"
+        )
     _ = law.needed_period  # says so where there is none
     single = {name: a[..., 0] for name, (a, axes) in law.arrays().items() if a.ndim > axes}
     made = replace(law, **single) if single else law
@@ -133,7 +135,7 @@ def of_law(law: Any) -> SampledController:
     if isinstance(law, Rule):
         if not law.measured:
             raise BadInput(
-                'an exported rule needs its readings\' names: dataclasses.replace(rule, measured=("theta",)).'
+                'to be exported, a rule needs the names of its readings: replace(rule, measured=("theta",)).'
             )
         readings, inputs = law.measured, law.commands(len(law.measured))
     else:
@@ -156,16 +158,16 @@ def of_design(content: Any, source: str) -> SampledController:
         When it is no design, was written before laws could be exported, or its loop falls.
     """
     if not isinstance(content, Mapping) or not {"law", "K", "period"} <= content.keys():
-        raise BadInput(f"{source} is no design.json; it needs the keys law, K and period: {AGAIN}.")
+        raise BadInput(f"{source} is not a design.json; it needs the keys law, K and period: {AGAIN}.")
     missing = [key for key in ("readings", "converter", "command", "margins") if key not in content]
     if not isinstance(content["law"], Mapping) or "kind" not in content["law"]:
         missing.append("the law's kind")
     if missing:
-        raise BadInput(f"{source} lacks {', '.join(missing)}, as older versions wrote it; {AGAIN}.")
+        raise BadInput(f"{source} lacks {', '.join(missing)}; an older version wrote it, so {AGAIN}.")
     if content["margins"] is None:
         raise BadInput(
-            f"the loop of {source} falls, so its law is not exported: {content.get('verdict', '')} Design it so that "
-            "it stands first."
+            f"the loop of {source} is unstable, so its law is not exported: {content.get('verdict', '')} Design a "
+            "stable one first."
         )
     try:
         return _without_idle_references(_read(content))
@@ -183,7 +185,7 @@ def of_swing_up(content: Any, source: str) -> SampledController:
     """
     again = "write it again with `upright swing-up ... -o FOLDER`"
     if not isinstance(content, Mapping) or not {"rule", "readings", "period", "limit"} <= content.keys():
-        raise BadInput(f"{source} is no swing_up.json with a law; {again}.")
+        raise BadInput(f"{source} is not a swing_up.json with a law; {again}.")
     if not (content.get("swing_up") or {}).get("held"):
         raise BadInput(
             f"the swing-up of {source} did not end upright, so it is not exported: {content.get('verdict', '')}"

@@ -61,9 +61,9 @@ class Episodes:
         if task not in TASKS:
             raise BadInput(f"a task is balance or swing_up, got '{task}'; {nearest(task, TASKS)}")
         if not 1e-4 <= period <= 1.0:
-            raise BadInput(f"a command is held for 1e-4 to 1 s, got {period:g} s; 0.02 is usual.")
+            raise BadInput(f"the period of an environment must be from 1e-4 to 1 s, got {period:g} s; 0.02 s is usual.")
         if lanes < 1:
-            raise BadInput(f"an environment has at least one lane, got {lanes}.")
+            raise BadInput(f"an environment needs at least one rig, got {lanes}.")
         points, hardware = rig.plant.equilibria, rig.hardware
         at = at or list(points)[-1]
         if at not in points:
@@ -78,15 +78,17 @@ class Episodes:
             )
         if hardware.value("relaxation", 0.0):
             raise BadInput(
-                "braking that builds up (actuator.relaxation) is remembered from step to step, which an environment "
-                "does not; identify without it, or set it to 0 in the fit."
+                "an environment cannot simulate braking that builds up (actuator.relaxation), since it starts anew at "
+                "every step; identify without it, or set it to 0 in the fit."
             )
         for what, value in (("limit", limit), ("travel", travel)):
             if value is not None and not 0 < value < 1e9:
-                raise BadInput(f"the {what} of an environment lies above 0 and below 1e9, got {value:g}.")
+                raise BadInput(f"the {what} of an environment must be above 0 and below 1e9, got {value:g}.")
         most = limit or min(hardware.value("limit", math.inf), full_command({**rig.more, GAIN: rig.gain}))
         if not math.isfinite(most):
-            raise BadInput("an environment needs the largest command: limit=10, or [actuator] limit in the study.")
+            raise BadInput(
+                "an environment needs the largest command: pass a limit, or state [actuator] limit in the study."
+            )
         self.rig, self.lanes, self.task, self.period, self.limit, self.threads = rig, lanes, task, period, most, threads
         driven = names.index(rig.plant.inputs[0].on)
         self.travel = np.where(np.arange(len(names)) == driven, travel or hardware.value("travel", math.inf), math.inf)

@@ -171,7 +171,6 @@ class _Plain(ast.NodeTransformer):
 
 def _refusal(node: ast.AST) -> BadInput:
     return BadInput(
-        f"the rule holds '{ast.unparse(node).splitlines()[0][:80]}', which this program does not write as C: it takes "
-        "numbers, given tuples by index, if, for and while, and returns (commands,), (memory,); "
-        "or take the target python."
+        f"the rule contains '{ast.unparse(node).splitlines()[0][:80]}', which cannot be translated to C. Use numbers, "
+        "the given tuples by index, if, for and while, and return (commands,), (memory,); or export it to python."
     )

@@ -67,7 +67,7 @@ def compiled_library(text: str) -> bytes | None:
         if compiled.returncode:
             message = (compiled.stderr.decode(errors="replace").strip() or "no message").splitlines()[0]
             raise BadInput(
-                f"the C compiler {compiler} did not make the unit's library: {message}; does it work otherwise?"
+                f"the C compiler {compiler} failed on the unit's library: {message}; does it compile other programs?"
             )
         return library.read_bytes()
 

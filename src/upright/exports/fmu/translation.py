@@ -358,8 +358,8 @@ def _operator(op: ast.AST, node: ast.AST) -> str:
 
 def _refusal(node: ast.AST) -> BadInput:
     return BadInput(
-        f"the kernel of this rig holds '{ast.unparse(node)[:80]}', which this program does not write as C; the "
-        "target gymnasium runs the kernel itself."
+        f"the kernel of this rig contains '{ast.unparse(node)[:80]}', which cannot be translated to C; the target "
+        "gymnasium runs the kernel itself."
     )
 
 

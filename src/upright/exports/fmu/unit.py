@@ -104,7 +104,7 @@ def unit_of(rig: Rig) -> Unit:
     hardware, plant = rig.hardware, rig.plant
     if hardware.value("relaxation", 0.0):
         raise BadInput(
-            "braking that builds up (actuator.relaxation) is remembered from step to step, which the unit does not; "
+            "a unit cannot simulate braking that builds up (actuator.relaxation), since it starts anew at every step; "
             "identify without it, or set it to 0 in the fit."
         )
     presliding = {j.presliding for j in plant.joints}
@@ -116,13 +116,13 @@ def unit_of(rig: Rig) -> Unit:
         derived=derived, flavour=choose(derived, values), dt=STEP, substeps=substeps(rig, STEP)
     )  # fmt: skip
     remarks = (
-        f"Joint {j.on} slides at once: the unit does not remember how far it has deflected before."
+        f"Joint {j.on} slides at once; its deflection before sliding is left out."
         for j in plant.joints if plant.parameters().get(j.presliding)
     )  # fmt: skip
     made = Unit(rig=rig, simulator=simulator, values=values, remarks=tuple(remarks))
     if made.remembered > LARGEST:
         raise BadInput(
-            f"the drive's delay and lag would make the unit remember {made.remembered} commands, and {LARGEST} is the "
-            "most; are they in seconds?"
+            f"for the drive's delay and lag the unit would have to remember {made.remembered} commands, more than "
+            f"{LARGEST}; are they in seconds?"
         )
     return made

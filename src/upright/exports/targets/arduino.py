@@ -66,7 +66,7 @@ def _narrow(made: SampledController, miss: str) -> str:
     where = "On boards whose double has 32 bits"
     if isinstance(made.law, Rule):
         return f"{where} (Mega) the self-test may fail, and nothing runs."
-    return f"{where} commands may miss by {miss}."
+    return f"{where} commands may differ by {miss}."
 
 
 TARGET = LawTarget(
@@ -74,5 +74,5 @@ TARGET = LawTarget(
     rules=True, warn=_narrow,
     test="arduino-cli compile --upload -b arduino:avr:mega -p PORT {folder}/law && arduino-cli monitor -p PORT "
     "-c baudrate=115200",
-    onward="Set limits and supply in law.ino and wires in board.h; it stands stopped until it is sent g.",
+    onward="Set limits and supply in law.ino and wires in board.h; it stays stopped until you send g.",
 )  # fmt: skip

@@ -79,7 +79,7 @@ def export(
 
     to, at = str(to), folder_if_given(out)
     if to not in TARGETS:
-        raise BadInput(f"--to is the form to write, and there is no '{to}'; {nearest(to, TARGETS)}")
+        raise BadInput(f"--to must name a form to export in, got '{to}'; {nearest(to, TARGETS)}")
     target = TARGETS[to]
     if isinstance(target, LawTarget):
         if limit is not None:
@@ -87,6 +87,6 @@ def export(
         made, name = controller_of(source)
         return write_law(made, name, target, at, single)
     if single:
-        raise BadInput("--float is of laws; a rig is simulated in double precision.")
+        raise BadInput("--float is for laws; a rig is simulated in double precision.")
     assert isinstance(target, RigTarget)  # there are no others
     return write_rig(source, target, at, limit)

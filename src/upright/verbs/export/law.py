@@ -40,12 +40,12 @@ def controller_of(source: Any) -> tuple[SampledController, str]:
     try:
         content = json.loads(read_text(path))
     except (UnicodeDecodeError, ValueError, RecursionError):
-        raise BadInput(f"{path} is no design.json; `upright design ... -o FOLDER` writes one.") from None
+        raise BadInput(f"{path} is not a design.json; `upright design ... -o FOLDER` writes one.") from None
     if isinstance(content, dict) and {"plant", "parameters"} <= content.keys():
         *forms, last = (t.name for t in TARGETS.own.values() if isinstance(t, RigTarget))
         raise BadInput(
-            f"{path} is a fit, and a law is what `upright design {path} --poles ... -o FOLDER` makes of it; the rig "
-            f"itself goes to {', '.join(forms)} or {last}."
+            f"{path} is a fit, not a law. `upright design {path} --poles ... -o FOLDER` makes a law from it; the rig "
+            f"itself is exported to {', '.join(forms)} or {last}."
         )
     return _of_content(content, str(path))
 
@@ -69,8 +69,8 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path | 
     if isinstance(made.law, Rule) and (single or not target.rules):
         of_rules = (t.name for t in TARGETS.own.values() if isinstance(t, LawTarget) and t.rules)
         raise BadInput(
-            f"a rule goes to {', '.join(of_rules)} in double precision, since it is not known what it makes of a "
-            f"rounding; got {'--float' if single else target.name}."
+            f"a rule is exported to {', '.join(of_rules)}, in double precision only, since its error in single "
+            f"precision is not known; got {'--float' if single else target.name}."
         )
     test = self_test(made)
     texts = target.write(made, test, single)
@@ -78,13 +78,13 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path | 
     warnings: list[str] = []
     if not math.isfinite(made.law.limit):
         warnings.append("The command's limit is not specified, so the program has none: design with --limit.")
-    exact = f"{len(test.readings)} samples are replayed and compared bit for bit"
+    exact = f"its self-test compares {len(test.readings)} samples bit for bit"
     miss = f"{number(test.single, 2)} {unit}".strip()
     if single:
-        exact = f"{len(test.readings)} samples are replayed and may miss by {miss} in single precision"
-        if test.single > step * 1.001:
-            than = f"more than the converter's step of {number(step, 2)} {unit}" if step else "which no converter hides"
-            warnings.append(f"Single precision may move a command by {miss}, {than}; a slower period moves it less.")
+        exact = f"its self-test compares {len(test.readings)} samples to within {miss} in single precision"
+        if test.single > 1.5 * step:  # whole steps, and the last digits of the command itself
+            than = f"more than the converter's step of {number(step, 2)} {unit}" if step else "with no converter step"
+            warnings.append(f"In single precision a command may differ by {miss}, {than}; a longer period reduces it.")
     else:
         warnings += filter(None, [target.warn(made, miss)])
     page = Chapter(
