@@ -69,7 +69,7 @@ def firmware_build(
         raise BadInput("an image is a file: name a folder for it, such as out='firmware'.")
     made = board_of(board)
     image = build_image(made, drive, Path(out), _ceilings(rig, brake, drive))
-    whence = "As it comes with this package." if image.ready else "Built here."
+    whence = "It comes with this package." if image.ready else "It was built on this machine."
     held = ceilings_in_words(image.ceilings)
     return Answer(
         image,
@@ -139,8 +139,11 @@ def firmware_flash(
     return Answer(
         flashed,
         Chapter(
-            title=f"Firmware on the {made.title}", verdict=f"{flashed.greeting} answers.",
-            detail="It was read back as it was written. It stands in FAULT until a host clears it.",
+            title=f"Firmware on the {made.title}",
+            verdict=f"{flashed.greeting} answers." if flashed.greeting else f"{image.path.name} was copied.",
+            detail=("The image was read back and compared." if made.flasher else "The boot ROM checks each block.")
+            + (" The board" if flashed.greeting else " Name --port to have the board asked, too; it")
+            + " stands in FAULT until a host clears it.",
             numbers={"port": flashed.port, "image": str(flashed.image), "greeting": flashed.greeting},
         ),
         [image.path],
@@ -197,11 +200,11 @@ def _ceilings(rig: PathLike | None, brake: float | str | None, drive: str) -> di
 
     ticks = round(1e3 * (si_if_given(brake, "s") or 0.0))
     if not 0 <= ticks <= 1000:
-        raise BadInput(f"a stop brakes for 1 s at most, got {ticks / 1e3:g} s.")
+        raise BadInput(f"--brake must be from 0 to 1 s, got {ticks / 1e3:g} s.")
     if ticks and drive != PAIR:
         raise BadInput(
-            f"a stop brakes by two PWM lines that are both low, on a bridge that shorts the motor then (BTS7960): "
-            f"drive '{PAIR}', got '{drive}'; on any other drive the board can only switch off."
+            f"--brake needs a bridge that shorts the motor while both PWM lines are low (BTS7960): --drive {PAIR}, got "
+            f"'{drive}'; with any other drive the board can only switch off."
         )
     return {**({} if rig is None else _limits(Path(rig))), **({"BRAKE": ticks} if ticks else {})}
 
@@ -216,5 +219,5 @@ def _limits(path: Path) -> dict[str, int]:
     rig, _ = model_and_truth(file)
     limits = file.limits({c.name: c.unit for c in rig.plant.coordinates}, rig.unit)
     if limits is None:
-        raise BadInput(f"{path} has no [limits]; the board's ceilings are made of them.")
+        raise BadInput(f"{path} has no [limits], and the board's ceilings follow from them; fill them in.")
     return ceilings_of(limits, rig.per_unit, float(file.board.get("full_scale", FULL_SCALE)))

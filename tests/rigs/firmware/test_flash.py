@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+import upright as up
 from upright.errors import BadInput, RigStopped
-from upright.rigs.firmware import board_of, flash
+from upright.rigs import firmware
+from upright.rigs.firmware import Flashed, Image, board_of, flash
 
 module = sys.modules[flash.__module__]
 in_time = module.in_time
@@ -50,13 +52,13 @@ def test_the_only_arduino_is_found_asked_about_written_and_greeted():
     assert "-U" not in look
     assert write[-2:] == ["-U", "flash:w:atmega2560-pair.hex:i"]
     assert "-V" not in write  # which would leave reading back out
-    assert "what is on it is lost" in asked[0]
+    assert "What is on it is lost" in asked[0]
 
 
 @pytest.mark.parametrize(
     ("there", "why"),
     [
-        ({}, r"no Arduino Mega 2560 is plugged in; look at its cable"),
+        ({}, r"no Arduino Mega 2560 is plugged in; check its cable"),
         ({"/dev/ttyS0": OTHER}, r"\(there are /dev/ttyS0, of other makers\)"),
         ({"COM3": ARDUINO, "COM4": ARDUINO}, "at COM3, COM4; say which with --port"),
     ],
@@ -102,7 +104,7 @@ def test_a_no_writes_nothing():
 
 
 def test_an_image_that_is_not_read_back_as_it_was_written_is_told():
-    with pytest.raises(RigStopped, match="not written whole"):
+    with pytest.raises(RigStopped, match="not written completely"):
         flashed(Flasher(0, 1), port="COM3")
 
 
@@ -130,6 +132,19 @@ def test_a_pico_is_a_drive_that_gets_its_image(tmp_path, monkeypatch):
     done = flash(pico, image, "COM5", greet=lambda port: f"firmware at {port}")
     assert (tmp_path / "RPI-RP2" / "pico-pair.uf2").read_bytes() == b"image"
     assert done.greeting == "firmware at COM5"
+    assert flash(pico, image).greeting == ""  # nobody was asked
     monkeypatch.setattr(module, "drives", list)
-    with pytest.raises(BadInput, match=r"hold BOOTSEL while you plug it in.*no such drives"):
+    with pytest.raises(BadInput, match=r"hold BOOTSEL while you plug it in.*drives here: none"):
         flash(pico, image)
+
+
+@pytest.mark.parametrize("answers", ["", "upright firmware, RP2040, two PWM lines on COM5"])
+def test_a_board_answers_where_it_was_asked_and_not_otherwise(answers, tmp_path, monkeypatch):
+    """A drive takes a file and says nothing of the firmware in it."""
+    image = Image(path=tmp_path / "pico-pair.uf2", ready=True)
+    flashed_now = Flashed(port="COM5", image=image.path, greeting=answers)
+    monkeypatch.setattr(firmware, "build_image", lambda *_: image)
+    monkeypatch.setattr(firmware, "flash", lambda *_, **__: flashed_now)
+    chapter = up.firmware_flash(board="pico", drive="pair", out=tmp_path).chapter
+    assert ("answers" in chapter.verdict) is bool(answers)
+    assert "read back" not in chapter.detail

@@ -110,13 +110,13 @@ def test_without_a_compiler_the_image_of_the_package_is_taken_or_what_is_missing
     image = build_image(mega, "pair", tmp_path / "out")
     assert image.ready
     assert image.path.read_bytes() == b"as built"
-    with pytest.raises(BadInput, match="with ceilings of its own"):
+    with pytest.raises(BadInput, match="with your ceilings"):
         build_image(mega, "pair", tmp_path, {"COMMAND": 50})
 
 
 @pytest.mark.parametrize("name", ["uno", "Nano"])
 def test_a_board_that_is_too_small_is_refused_with_the_reason(name):
-    with pytest.raises(BadInput, match=rf"not for an {name.capitalize()}: it has 2 kB of memory.*Mega 2560"):
+    with pytest.raises(BadInput, match=rf"'{name}' is too small a board: .* need 3 kB of memory.*Mega 2560"):
         board_of(name)
 
 

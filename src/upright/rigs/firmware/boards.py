@@ -57,8 +57,7 @@ class BoardKind:
         """
         if drive not in self.drives:
             raise BadInput(
-                f"the {self.title} drives a motor by {', '.join(self.drives)}, got '{drive}'; "
-                f"{nearest(drive, self.drives)}"
+                f"drives of the {self.title} are {', '.join(self.drives)}, got '{drive}'; {nearest(drive, self.drives)}"
             )
         return f"{self.name}-{drive}.{self.suffix}"
 
@@ -95,9 +94,9 @@ def board_of(name: str) -> BoardKind:
     word = name.lower()
     if word in _TOO_SMALL:
         raise BadInput(
-            f"the firmware is not for an {name.capitalize()}: it has 2 kB of memory, and frames, limits and the law "
-            "take 3 kB; two encoders, the host and 20 kHz PWM take timers and interrupts that it does not have. "
-            "Take an Arduino Mega 2560 (--board mega) or a Raspberry Pi Pico (--board pico)."
+            f"'{name}' is too small a board: frames, limits and the law need 3 kB of memory, and two encoders, the "
+            "host and 20 kHz PWM need more timers and interrupts. Take an Arduino Mega 2560 (--board mega) or a "
+            "Raspberry Pi Pico (--board pico)."
         )
     word = _SAME.get(word, word)
     if word not in BOARDS:

@@ -24,7 +24,7 @@ class Flashed:
     Attributes
     ----------
     greeting : str
-        What the firmware answered afterwards.
+        What the firmware answered afterwards; empty where it was not asked, as on a Pico without a port.
     """
 
     port: str
@@ -47,7 +47,7 @@ def port_of(board: BoardKind, port: str, there: dict[str, int]) -> str:
         return fitting[0]
     if not fitting:
         others = f" (there are {', '.join(there)}, of other makers)" if there else ""
-        raise BadInput(f"no {board.title} is plugged in{others}; look at its cable, or say where it is with --port.")
+        raise BadInput(f"no {board.title} is plugged in{others}; check its cable, or name its port with --port.")
     raise BadInput(f"several boards are plugged in, at {', '.join(fitting)}; say which with --port.")
 
 
@@ -96,18 +96,18 @@ def flash(
         return _copied(board, image, port, hand, greet)
     if shutil.which(board.flasher) is None:
         raise BadInput(
-            f"to write the image, {board.flasher} must be on this machine (sudo apt install {board.flasher})."
+            f"to write the image, {board.flasher} is needed on this machine (sudo apt install {board.flasher})."
         )
     at = port_of(board, port, there() if not port else {})
     common = [board.flasher, "-p", board.name, "-c", "wiring", "-P", at, "-b", "115200", "-D"]
     looked = run([*common, "-n"], _LOOKS)
     if looked.returncode:
-        raise RigStopped(f"No {board.title} answers at {at}: {_last(looked.stderr)} Look at cable and port.")
-    if not hand(f"The {board.title} at {at} gets {image.name}; what is on it is lost. Its motor's supply is off."):
+        raise RigStopped(f"No {board.title} answers at {at}: {_last(looked.stderr)} Check cable and port.")
+    if not hand(_question(board, at, image)):
         raise RigStopped("Nothing was written.")
     written = run([*common, "-U", f"flash:w:{image}:i"], _WRITES)  # reads it back by itself
     if written.returncode:
-        raise RigStopped(f"The image was not written whole: {_last(written.stderr)} Flash again.")
+        raise RigStopped(f"The image was not written completely: {_last(written.stderr)} Flash again.")
     return Flashed(port=at, image=image, greeting=greet(at))
 
 
@@ -137,15 +137,17 @@ def _copied(
     volumes = drives()
     if len(volumes) != 1:
         raise BadInput(
-            f"a {board.title} takes its image as a drive: hold BOOTSEL while you plug it in, and say it again; "
-            f"{len(volumes) or 'no'} such drives are there. Or copy {image} onto it yourself."
+            f"a {board.title} takes its image as a USB drive: hold BOOTSEL while you plug it in, and run this again. "
+            f"Such drives here: {len(volumes) or 'none'}. Or copy {image} onto it yourself."
         )
-    if not hand(
-        f"The {board.title} at {volumes[0]} gets {image.name}; what is on it is lost. Its motor's supply is off."
-    ):
+    if not hand(_question(board, str(volumes[0]), image)):
         raise RigStopped("Nothing was written.")
     shutil.copyfile(image, volumes[0] / image.name)
-    return Flashed(port=port or str(volumes[0]), image=image, greeting=greet(port) if port else image.stem)
+    return Flashed(port=port or str(volumes[0]), image=image, greeting=greet(port) if port else "")
+
+
+def _question(board: BoardKind, at: str, image: Path) -> str:
+    return f"Write {image.name} to the {board.title} at {at}? What is on it is lost; the motor's supply must be off."
 
 
 def _last(text: str) -> str:

@@ -95,10 +95,10 @@ def build_image(board: BoardKind, drive: str, out: Path, ceilings: Mapping[str, 
     if missing:
         if not ceilings and (READY / name).is_file():
             return Image(path=replace_file(target, (READY / name).read_bytes()), ready=True)
-        why = " with ceilings of its own" if ceilings else ""
+        why = " with your ceilings" if ceilings else ""
         raise BadInput(
             f"to build the image{why}, {' and '.join(missing)} must be on this machine "
-            f"(sudo apt install {' '.join(missing.values())}); this package has no image of it that is ready."
+            f"(sudo apt install {' '.join(missing.values())}); this package has no ready one{why}."
         )
     flags = " ".join(f"-DCEILING_{k}={v}" for k, v in (ceilings or {}).items())
     with tempfile.TemporaryDirectory(prefix="upright-firmware-") as folder:
@@ -107,7 +107,7 @@ def build_image(board: BoardKind, drive: str, out: Path, ceilings: Mapping[str, 
             capture_output=True, encoding="utf-8", errors="replace", check=False,
         )  # fmt: skip
         if built.returncode:
-            raise BadInput(f"the compiler refuses the firmware: {built.stderr.strip()[-500:]}")
+            raise BadInput(f"the firmware does not compile: {built.stderr.strip()[-500:]}")
         return Image(
             path=replace_file(target, (Path(folder) / name).read_bytes()), ready=False, ceilings=dict(ceilings or {})
         )
