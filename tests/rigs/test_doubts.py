@@ -21,7 +21,7 @@ WEAK = Suspicion(name="the drive", factor=0.5)
 def doubts(monkeypatch):
     """Doubts of a rig whose watch and counters say what they are told."""
 
-    def of(*, drive=False, pendulum=False, weak=False, speaks=False, likely=()):
+    def of(*, drive=False, pendulum=False, rests=False, weak=False, speaks=False, likely=()):
         class Told:
             name, which = "psi", 0
 
@@ -34,6 +34,10 @@ def doubts(monkeypatch):
             def sees(self, reading, away, command):
                 assert (reading, away, command) == (0.3, [0.1, 0.2], 1.5)
                 return drive
+
+            @property
+            def rests(self):
+                return rests
 
             def weak(self):
                 return weak
@@ -73,6 +77,12 @@ def test_what_moves_as_it_should_is_not_doubted(doubts):
         ({"drive": True, "weak": True}, Fault.MODEL,
          "psi does not move as its command must have moved it; likeliest is that the drive gives too little, or "
          "something holds it fast. Check supply, cable and current limit.", False),
+        ({"drive": True, "rests": True}, Fault.MODEL,
+         "psi does not move as its command must have moved it; likeliest is that the drive gives too little, or "
+         "something holds it fast. Check supply, cable and current limit.", False),
+        ({"pendulum": True, "rests": True}, Fault.ENCODER,
+         "theta shows not a single count although what carries it was accelerated: its encoder is dead, or something "
+         "holds it fast.", True),
         ({"drive": True, "pendulum": True}, Fault.ENCODER,
          "psi shows not a single count although its command must have moved it: its encoder is dead, or something "
          "holds it fast.", False),

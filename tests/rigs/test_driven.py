@@ -47,6 +47,34 @@ def test_an_arm_that_a_hand_holds_against_its_command_is_not_taken_for_one_with_
     assert still.sees(0.4, [0.4, lean + math.radians(0.5)], command)
 
 
+@pytest.mark.parametrize("lean", [-0.05, 0.0, 0.004, 0.05])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_pendulum_on_an_arm_that_shows_nothing_tells_whether_it_rests_or_moves_unseen(lean, way):
+    """theta'' = g/l theta + psi''/rho with psi'' = 0 or what the command makes, solved from rest; in whole counts.
+
+    True friction is half of what is allowed for, so that the arm goes farther than it must have.
+    """
+    command, growth = 10 * way * HELD_BY * sticking(RIG), math.sqrt(GRAVITY)
+    psi = MODEL.B[1, 0] * (command - way * sticking(RIG))
+    for moves in (False, True):
+        still, carried = StillDrive(RIG, "inverted"), moves * psi / RHO / GRAVITY
+        for k in range(500):
+            theta = (lean + carried) * math.cosh(growth * k * T) - carried
+            if still.sees(0.0, [0.0, round(theta * RIG.per_unit[1]) / RIG.per_unit[1]], command):
+                break
+        else:  # at rest and upright nothing moves at all, and nobody can tell
+            assert (lean, moves) == (0.0, False)
+            continue
+        assert still.rests is not moves
+
+
+def test_a_drive_that_gives_nothing_is_not_taken_for_a_dead_encoder():
+    scene = Scene(truth=nonideal(make_rig("furuta", 2), 2)).started(tilt=0.08)
+    with pytest.raises(RigStopped, match="the drive"):
+        scene.run(4.0, then=lambda p: setattr(p, "write", lambda _: type(p).write(p, 0.0)))
+    assert scene.beside.faults == Fault.MODEL
+
+
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_a_pendulum_must_swing_when_what_carries_it_leaves_its_straight_line(speed):
     """psi = v t + a t^2/2 and a pendulum that shows nothing: it must have swung by psi'' / rho t^2/2."""
