@@ -96,7 +96,7 @@ def test_a_pendulum_that_is_thrown_the_wrong_way_is_mirrored(drafted, sign):
     nu, a = 3.0, 0.02
     theta = a * nu**2 / LENGTH / (W**2 - nu**2) * np.sin(nu * T) + 0.05 * np.cos(W * T)
     text, _ = drafted(x=a * np.sin(nu * T), theta=sign * theta)
-    assert ("\nsign = -1   # it is thrown" in text) == (sign == -1)
+    assert ("\nsign = -1   # it swings" in text) == (sign == -1)
 
 
 def test_an_arm_that_hardly_moves_is_no_second_coordinate(drafted):

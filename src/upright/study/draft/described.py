@@ -47,14 +47,14 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
     rig = named["[rig]"]
     if is_ecp(inspection):
         vendor = "ECP 210" if coordinates[body] == "m" else "ECP 205"
-        rig.key("vendor", vendor, "the log is an ECP rig's; its data sheet has what is missing here")
+        rig.key("vendor", vendor, "the log is from an ECP rig; its data sheet fills in what is missing here")
     else:
         period = f"{record.period * 1e3:.4g} ms"
-        rig.key("servo_period", {"value": period, "assumed": True}, "the log's; MEASURE if the controller is faster")
+        rig.key("servo_period", {"value": period, "assumed": True}, "the log's own; MEASURE if the controller is faster")
     rig.key(
         "travel",
         _went(recognised, body, coordinates[body]),
-        "MEASURE: how far it may go; here it went so far",
+        "MEASURE: how far it may go; in this log it went this far",
         off=True,
     )
     actuator, drive = (
@@ -70,7 +70,7 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
         actuator.key("limit", limit, "the command is cut off there; MEASURE")
     else:
         actuator.key(
-            "limit", with_unit(most, unit), "MEASURE: largest command that passes; this is the log's", off=True
+            "limit", with_unit(most, unit), "MEASURE: largest command that passes; the largest here", off=True
         )
 
 

@@ -54,7 +54,7 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
             recognised, tables = _drafted(record, inspection, log, study, better)
         doubts = (*recognised.doubts, *sentences)
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
-        rig.key("guessed", True, "the plant was not specified: take this out once you know it is this one")
+        rig.key("guessed", True, "the plant was not given; delete this line once you are sure of it")
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# Quantities are written with units. { guess = ... } is estimated; a text or number alone is known.")

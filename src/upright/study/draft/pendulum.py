@@ -174,7 +174,7 @@ def starts_hanging(recognised: Recognised, plant: type[Plant]) -> PendulumStarts
     """Numbers of a pendulum that swings about where it hangs; any other plant has sizes that swing as slowly."""
     w = recognised.frequency or 6.0
     length = G / w**2
-    assumed = {"m_p": (1.0, f"{SCALE}; a swing alone sees only ratios"), "J_p": (0.0, SIMPLE)}
+    assumed = {"m_p": (1.0, f"{SCALE}; a swing alone shows only ratios"), "J_p": (0.0, SIMPLE)}
     if recognised.plant == "pendulum":
         friction = {"b_2": 0.002 * w * length**2, "b_2c": 0.002 * G * length, "b_2q": 0.002 * length**2}
         return PendulumStarts(assumed=assumed, guesses={"l_cg": length, **friction})
@@ -285,12 +285,12 @@ def _defaults(recognised: Recognised, plant: type[Plant], balanced: Balanced | N
     if missing:
         table.key("locked", missing, "no column was found; give them a sensor if they move")
     if recognised.drive is None and not missing and recognised.plant in ("cart-pendulum", "furuta"):
-        why = "its measured motion is prescribed, since no column says what drove it"
+        why = "its measured motion is prescribed, since no column holds its command"
         table.key("held", [plant.coordinates[0].name], why)
     if balanced:
-        table.key("horizon", ["50 ms", "200 ms"], "a free run of an unstable plant tells nothing")
+        table.key("horizon", ["50 ms", "200 ms"], "a free run of an unstable plant proves nothing")
         unknown = [f"offset.{plant.coordinates[-1].name}", "input_offset"]
-        table.key("unknown", unknown, "where the counter was zeroed; what leans on the first body")
+        table.key("unknown", unknown, "where the counter was zeroed; a constant force on the first body")
     else:
         unknown = ["initial"] if recognised.drive is not None and recognised.settled else ["initial", "offset"]
         table.key("unknown", unknown, "estimated for each run alone")

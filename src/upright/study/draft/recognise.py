@@ -232,7 +232,7 @@ def drive_column(record: Record, inspection: Inspection) -> Column | None:
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     """Plant whose coordinates look like these columns, and how sure that is."""
     if named := named_after(places):
-        return named, f"The columns are called as the coordinates of a {named}."
+        return named, f"The columns have the names of the coordinates of {named}."
     lengths = [c for c in places if c.guess in LENGTHS]
     counts = [c for c in places if c.guess in ("counts", "")]
     angles = [c for c in places if c.guess in ANGLES]

@@ -59,7 +59,7 @@ def command_unit(c: Column) -> tuple[str, float]:
 def no_drive_table() -> TomlTable:
     """What to fill in when a column drives after all."""
     table = TomlTable("# [drive]")
-    table.key("column", "...", "no column drives: the runs are free", off=True)
+    table.key("column", "...", "no column commands a drive, so the runs are free", off=True)
     return table
 
 
@@ -98,13 +98,13 @@ def sensor_table(
         step = {"value": f"{c.resolution.step:.4g} {c.guess}", "measured": True}
         table.key("resolution", step, "from the column's steps")
     elif (most := c.resolution.step or c.resolution.hidden) and c.guess in PLACES:
-        why = "MEASURE: no encoder's steps are seen; digits or noise hide any up to that"
+        why = "MEASURE: no encoder steps are visible; decimals or noise would hide steps up to this size"
         table.key("resolution", {"value": f"{most:.3g} {c.guess}", "assumed": True}, why)
     where = "lay before the first command" if driven else "comes to rest"
     zero = zero if abs(zero) > 1e-9 * (c.high - c.low) else 0.0  # a motion that has died out ends in rounding
     table.key("offset", zero, f"reading at which {name} is zero, here where it {where}", digits=9)
     if mirrored:
-        table.key("sign", -1, "it is thrown the other way than the plant's angle")
+        table.key("sign", -1, "it swings opposite to the plant's angle")
     else:
         table.key("sign", -1, "when the column counts the other way", off=True)
     return table
