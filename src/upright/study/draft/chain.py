@@ -197,7 +197,7 @@ def _drive(log: ChainLog, plant: type[Plant], start: ChainStarts) -> list[TomlTa
         relaxation = {"guess": "30 ms", "min": 0, "max": "2 s"}
         actuator.key("relaxation", relaxation, "time in which that builds up and fades")
     if start.limit:
-        actuator.key("limit", {"guess": with_unit(start.limit, unit), "min": 0}, "a larger one does not reach the bodies")
+        actuator.key("limit", {"guess": with_unit(start.limit, unit), "min": 0}, "more does not reach the bodies")
     actuator.key("delay", {"guess": "2 ms", "max": "50 ms"}, off=not log.disks or bool(log.loop))
     return [drive_table(c, unit, scale, reversed_=log.recognised.reversed), actuator]
 

@@ -50,7 +50,7 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
         rig.key("vendor", vendor, "the log is from an ECP rig; its data sheet fills in what is missing here")
     else:
         period = f"{record.period * 1e3:.4g} ms"
-        rig.key("servo_period", {"value": period, "assumed": True}, "the log's own; MEASURE if the controller is faster")
+        rig.key("servo_period", {"value": period, "assumed": True}, "the log's; MEASURE if the controller is faster")
     rig.key(
         "travel",
         _went(recognised, body, coordinates[body]),
@@ -69,9 +69,7 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
         limit = {"value": with_unit(most, unit, 12), "assumed": True}
         actuator.key("limit", limit, "the command is cut off there; MEASURE")
     else:
-        actuator.key(
-            "limit", with_unit(most, unit), "MEASURE: largest command that passes; the largest here", off=True
-        )
+        actuator.key("limit", with_unit(most, unit), "MEASURE: largest command that passes; the largest here", off=True)
 
 
 def is_cut_off(command: Array, share: float) -> bool:
