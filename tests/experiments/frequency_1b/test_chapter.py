@@ -5,114 +5,106 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from upright.experiments.frequency_1b.chapter import (
-    _bench,
-    _simplex_sentence,
-    _start_sentence,
-    _steps,
-    _way_table,
-    log_chapter,
-)
+from upright.experiments.frequency_1b.chapter import chapter, log_chapter
 from upright.experiments.frequency_1b.run import LoggedResponse
-from upright.identification.frequency.fitting import Way
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.fit import Estimate, Pole
-from upright.physics import find
 from upright.report.page import Table
-from upright.rig.makes import MAKES
 
-FALL, SWING = ("inverted", "unstable pole"), ("rest", "mode")
-COULOMB = find("furuta").joints[0].coulomb
+FALL, SWING = ("inverted", "unstable pole"), ("hanging", "mode")
 
 
 def estimate(value: float, error: float = 0.0) -> Estimate:
     return Estimate(value=value, stderr=error, interval=(value - 2 * error, value + 2 * error), unit="1/s")
 
 
-def way(name: str, **how: float) -> Way:
-    found = {"squares_dB": 12.34, "evaluations": 567, "seconds": 0.891} | how
-    return Way(name=name, values={}, model=np.zeros((1, 1), dtype=complex), **found)
+@pytest.fixture
+def page_of(done):
+    """The page where the number that matters is 5 1/s if the rig falls and 27 rad/s if it swings."""
 
+    def made(kind=FALL, simplex=5.25 + 26.0j, make=done.make, data=done.answer.data, **squares):
+        a = done.answer
+        told = replace(
+            a, key=(*kind, Pole(real=estimate(5.0, 0.005), imag=estimate(27.0, 0.005))), simplex_pole=simplex,
+            simplex=replace(a.simplex, squares_dB=12.34, evaluations=567, seconds=0.891), data=data,
+            squares=replace(a.squares, way=replace(a.squares.way, seconds=2.0), **squares),
+        )  # fmt: skip
+        return chapter(replace(done, answer=told, make=make))
 
-def answer(kind=FALL, real=5.0, imag=27.0, simplex=5.25 + 26.0j, names=(), parameters=None, **squares):
-    """What a fit of a Furuta pendulum came to; the number that matters is the real part where it falls."""
-    return SimpleNamespace(
-        key=(*kind, Pole(real=estimate(real, 0.005), imag=estimate(imag, 0.005))), simplex_pole=simplex,
-        squares=SimpleNamespace(names=names, way=way("least squares", seconds=2.0), **squares), simplex=way("simplex"),
-        rig=SimpleNamespace(plant=find("furuta"), parameters=parameters or {}), data=SimpleNamespace(hold=3.5e-3),
-    )  # fmt: skip
+    return made
 
 
 @pytest.mark.parametrize(
     ("how", "said"),
     [
-        ({}, "says 5.250, 5 % more."),
-        ({"simplex": 4.9 + 99j}, "says 4.900, 2 % less."),
-        ({"kind": SWING}, "says 26.00, 3.7 % less."),
-        ({"kind": SWING, "simplex": 99 + 27.27j}, "says 27.27, 1 % more."),
+        ({}, "gives 5.250 1/s, 5 % more."),
+        ({"simplex": 4.9 + 99j}, "gives 4.900 1/s, 2 % less."),
+        ({"kind": SWING}, "gives 26.00 rad/s, 3.7 % less."),
+        ({"kind": SWING, "simplex": 99 + 27.27j}, "gives 27.27 rad/s, 1 % more."),
         ({"simplex": complex(math.nan, 3.0)}, "ends at a rig without such a pole."),
         ({"kind": SWING, "simplex": complex(3.0, math.inf)}, "ends at a rig without such a pole."),
     ],
 )
-def test_the_simplex_is_held_against_the_real_part_where_it_falls_and_the_imaginary_where_it_swings(how, said):
-    assert _simplex_sentence(answer(**how)).endswith(said)
+def test_the_simplex_is_held_against_the_real_part_where_it_falls_and_the_imaginary_where_it_swings(page_of, how, said):
+    assert page_of(names=("J_p",), **how).detail.endswith(said)
 
 
 @pytest.mark.parametrize(
     ("simplex", "names", "blamed"),
-    [(5.25, (COULOMB,), True), (4.75, (COULOMB,), True), (5.04, (COULOMB,), False), (5.25, ("J_p",), False)],
+    [(5.25, ("b_1c",), True), (4.75, ("b_1c",), True), (5.04, ("b_1c",), False), (5.25, ("J_p",), False)],
 )
-def test_dry_friction_is_blamed_for_more_than_a_percent_where_there_is_any(simplex, names, blamed):
-    sentence = _simplex_sentence(answer(simplex=complex(simplex, 0.0), names=names))
-    assert ("dry friction has to pass for viscous friction" in sentence) == blamed
+def test_dry_friction_is_blamed_for_more_than_a_percent_where_there_is_any(page_of, simplex, names, blamed):
+    page = page_of(simplex=complex(simplex, 0.0), names=names)
+    assert ("dry friction passes for viscous friction" in page.detail) == blamed
 
 
 @pytest.mark.parametrize(("kind", "unit", "walked", "found"), [
     (FALL, "1/s", "5.250", "5.0000"), (SWING, "rad/s", "26.00", "27.0000"),
 ])  # fmt: skip
-def test_both_ways_stand_side_by_side_with_the_number_that_matters(kind, unit, walked, found):
+def test_both_ways_stand_side_by_side_with_the_number_that_matters(page_of, kind, unit, walked, found):
     """Its interval of 0.02 is a 250th of 5 and a 1350th of 27: five and six digits show the ends apart."""
-    table = _way_table(answer(kind))
+    page = page_of(kind)
+    table, *_ = [b for part in page.parts for b in part.content if isinstance(b, Table)]
     assert table.headings == ("", "dB²", "models", "s", f"{kind[1]} [{unit}]")
-    assert table.rows == (("simplex", "12.3", "567", "0.89", walked), ("least squares", "12.3", "567", "2.0", found))
+    assert table.rows[0] == ("simplex on dB", "12.3", "567", "0.89", walked)
+    assert (table.rows[1][0], *table.rows[1][3:]) == ("least squares", "2.0", found)
     assert table.numbers == (1, 2, 3, 4)
+    assert ("falls upright" in page.question) == (kind == FALL)
 
 
-def test_the_bench_is_told_with_its_tolerances_and_those_of_experiment_1a():
-    known = {
-        "J_d": SimpleNamespace(value=4e-3, uncertainty=2e-5), "m_p": SimpleNamespace(value=0.1, uncertainty=2e-4),
-        "g": SimpleNamespace(value=9.81, uncertainty=None),
-    }  # fmt: skip
-    make = SimpleNamespace(bench={"m_p": 2e-3, "r": 3e-3})
-    told = _bench(SimpleNamespace(make=make, answer=answer(parameters=known)))
-    assert told.startswith("Known from the bench: m_p to 0.2 %, r to 0.3 %; from experiment 1a: J_d to 0.5 %. ")
+def first_of(page, title):
+    return next(part for part in page.parts if part.title == title).content
+
+
+def test_the_bench_is_told_with_its_tolerances_and_those_of_experiment_1a(page_of, done):
+    """The rig model knows m_p to 0.2 % and l_cg to 0.3 %; what is not of the bench was weighed."""
+    told = first_of(page_of(), "Parameters")[0]
+    assert told.startswith("Known from the bench: m_p to 0.2 %, l_cg to 0.3 %. A response sees ")
     assert told.endswith("the unstable pole does not depend on it.")
-    swings = _bench(SimpleNamespace(make=make, answer=answer(SWING)))
-    assert swings == (
-        "Known from the bench: m_p to 0.2 %, r to 0.3 %; it fixes the scale of masses, stiffness, frictions and gain."
+    weighed = first_of(page_of(SWING, make=replace(done.make, bench={"m_p": 2e-3})), "Parameters")[0]
+    assert weighed == (
+        "Known from the bench: m_p to 0.2 %; from experiment 1a: l_cg to 0.3 %. "
+        "The bench fixes the scale of masses, stiffness, frictions and gain."
     )
 
 
-def test_a_rig_that_falls_is_designed_for_where_it_falls(tmp_path):
-    def commands(kind):
-        return [s.command for s in _steps(SimpleNamespace(answer=answer(kind), folder=tmp_path, make=MAKES["furuta"]))]
-
-    gains, again, _ = commands(FALL)
+def test_a_rig_that_falls_is_designed_for_where_it_falls(page_of, done):
+    data = replace(done.answer.data, hold=3.5e-3)
+    gains, again, _ = (s.command for s in page_of(data=data).steps)
     assert "--at inverted --poles" in gains
-    assert '--rig furuta --hold "3.5 ms" -o again' in again
-    assert "--lqr 1,0,1,0" in commands(SWING)[0]
+    assert '--rig linear --hold "3.5 ms" -o again' in again
+    assert "--lqr 1,0,1,0" in page_of(SWING).steps[0].command
 
 
-def test_intervals_are_widened_where_the_errors_stated_were_too_small():
-    told = _start_sentence(answer(reached=3, starts=8, misfit=2.25))
-    assert told.startswith("3 of 8 starts reached the same minimum; chi square per degree of freedom 2.2 ")
-    assert "by whose root intervals are widened" in told
-    assert "widened" not in _start_sentence(answer(reached=8, starts=8, misfit=0.9))
+def test_intervals_are_widened_where_the_errors_stated_were_too_small(page_of):
+    told = first_of(page_of(reached=3, starts=8, misfit=2.25), "Parameters")[1]
+    assert told.startswith("3 of 8 starts reached the same minimum. Chi square per degree of freedom is 2.2 ")
+    assert "intervals are widened by its root" in told
+    assert "widened" not in first_of(page_of(reached=8, starts=8, misfit=0.9), "Parameters")[1]
 
 
 def logged(coherence: float = 0.95) -> LoggedResponse:
@@ -158,4 +150,4 @@ def test_magnitudes_are_known_where_half_of_the_power_follows_the_command(cohere
         error = 100 * float(np.median(found.response.error[found.response.coherence >= 0.5]))
         assert f"({share} frequencies), magnitudes are known to {error:.1f} % (median" in told.verdict
     else:
-        assert told.verdict == "Nowhere does half of the power follow the command: this log tells no response."
+        assert told.verdict.startswith("At no frequency does half of the power follow the command")

@@ -16,7 +16,7 @@ from upright.experiments.frequency_1b import run as frequency_run
 from upright.experiments.frequency_1b import sweeps
 from upright.experiments.frequency_1b.chapter import chapter, true_key
 from upright.experiments.frequency_1b.figures import bode_charts
-from upright.experiments.frequency_1b.run import FrequencyRun, run_frequency
+from upright.experiments.frequency_1b.run import run_frequency
 from upright.experiments.frequency_1b.sweeps import (
     EVERY,
     SHARE,
@@ -26,11 +26,9 @@ from upright.experiments.frequency_1b.sweeps import (
     collect,
     grid,
     sines,
-    stepped_sine,
 )
-from upright.experiments.stand.known import Known, bench, model_of
-from upright.identification.frequency.answer import explain, key_value
-from upright.identification.frequency.response import FrequencyResponse
+from upright.experiments.stand.known import Known, bench
+from upright.identification.frequency.answer import key_value
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
 from upright.identification.model.fit import Estimate, Pole
 from upright.readers import read
@@ -124,12 +122,6 @@ def test_a_broadband_command_is_whole_steps_of_the_converter_where_there_is_one(
     assert np.mean(16 * smooth % 1 == 0) < 0.01
 
 
-@pytest.fixture(scope="module")
-def hurried():
-    """Three sines of eight seconds each: too short for the two slow ones, which swing on."""
-    return stepped_sine(make_rig("linear"), MAKES["linear"], count=3, seconds=8.0)
-
-
 def test_sines_that_did_not_settle_are_named_by_their_frequency(hurried):
     """And only they: with none of them late, nothing is said."""
     rig = make_rig("linear")
@@ -192,24 +184,6 @@ def test_the_time_at_the_rig_is_that_of_its_sines_settled_or_not(hurried):
     assert len(hurried.log) == sum(len(d.record) for d in hurried.dwells)
 
 
-@pytest.fixture(scope="module")
-def done(hurried, tmp_path_factory):
-    """The pendulum's own linear model at eight frequencies, explained, as if the hurried sines had told it."""
-    rig, make = make_rig("linear"), MAKES["linear"]
-    model = rig.linear("hanging")
-    omega = np.geomspace(*make.band, 8)
-    answer = np.array([(model.C @ np.linalg.solve(1j * w * np.eye(4) - model.A, model.B))[:, 0] for w in omega])
-    data = FrequencyResponse(
-        omega=omega, response=answer, outputs=("x", "theta"), units=("m", "rad", "V"),
-        variance=1e-6 * np.abs(answer) ** 2, dry=4 / (np.pi * np.abs(answer) * omega[:, None]),
-    )  # fmt: skip
-    explained = explain(model_of(make, bench(rig, make), make.bench), "hanging", data)
-    return FrequencyRun(
-        rig=rig, make=make, sweep=hurried, answer=explained, folder=tmp_path_factory.mktemp("told"), kind="sines",
-        seconds=1.0,
-    )  # fmt: skip
-
-
 def found(value: float, error: float, unit: str) -> Estimate:
     return Estimate(value=value, stderr=error, interval=(value - 2 * error, value + 2 * error), unit=unit)
 
@@ -232,8 +206,8 @@ def test_the_key_number_is_told_in_its_unit_with_what_nobody_weighs_beside_the_t
         return chapter(replace(done, answer=replace(done.answer, key=(at, what, pole), fit=fit)))
 
     full = told(others | weighed)
-    assert f"The twin's own is {true:.4}"[:-1] in full.detail
-    assert ": 1 % off, inside the interval." in full.detail
+    assert f"The twin's true value is {true:.4}"[:-1] in full.detail
+    assert f" {unit}; the estimate is 1 % off, inside its 95 % interval." in full.detail
     first, inertia, gain = full.findings
     assert first.what == f"{what}, {at} [{unit}]"
     assert float(first.value) == pytest.approx(1.01 * true, rel=5e-3)  # three figures
