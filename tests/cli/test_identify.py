@@ -223,7 +223,7 @@ def test_init_does_not_overwrite_unless_told(bench):
         (["identify", "known.toml"], "give one a guess"),
         (["identify", "unseen.toml"], "at least one needs role"),
         (["predict", "gone.json", "study.toml"], "upright predict OUT/fit.json STUDY.toml"),
-        (["predict", "study.toml", "study.toml"], "no fit.json"),
+        (["predict", "study.toml", "study.toml"], "not a fit.json"),
         (["predict", "empty.json", "study.toml"], "lacks the keys"),
         (["predict", "chain.json", "study.toml"], "both must be the same plant"),
         (["init", "gone.csv"], "There is no file"),

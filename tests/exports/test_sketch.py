@@ -160,7 +160,7 @@ def test_it_stops_at_its_largest_command_for_too_long(sketch):
 def test_it_starts_near_its_target_only(sketch):
     sketch.do("turn 0 300", "type g")
     assert not sketch.run(20)[1]
-    assert sketch.printed().endswith("not started: off its start\n")
+    assert sketch.printed().endswith("not started: outside its start window\n")
     sketch.do("turn 0 -200", "button 1", "type g")
     assert not sketch.run(20)[1]
     assert sketch.printed() == "not started: the stop button is open\n"

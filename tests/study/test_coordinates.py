@@ -91,8 +91,8 @@ def test_a_law_on_coordinates_begins_at_what_the_sum_tells(study):
 @pytest.mark.parametrize(
     ("sensors", "run", "says"),
     [
-        (TIP, "", "nothing tells theta: add [sensors.theta], lock theta in this run, or state the plant in what is"),
-        (TIP + '[sensors.theta]\nexpression = "theta + x/0.3"\n', "", "x, theta do not tell these coordinates apart"),
+        (TIP, "", "no sensor determines theta: add [sensors.theta], lock theta in this run, or state the plant in"),
+        (TIP + '[sensors.theta]\nexpression = "theta + x/0.3"\n', "", "x, theta do not determine these coordinates"),
         ('[sensors.x]\nexpression = "2*theta"\n', "", "measures '2*theta', without x in it; call it [sensors.theta]"),
         ('[sensors.x]\nexpression = "x + tip"\n', "", "'tip' is no coordinate"),
         ('[sensors.x]\nexpression = "x*theta"\n', "", "is no sum of coordinates times numbers"),

@@ -173,7 +173,7 @@ def test_what_lies_at_a_limit_is_allowed(changes):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("{", "is no fit.json; the first argument"),
+        ("{", "is not a fit.json; the first argument"),
         ("[]", "lacks the keys plant, parameters of a fit.json"),
         ('{"plant": "furuta"}', "lacks the keys"),
         (json.dumps(FIT | {"format": 2}), "has format 2, this version reads 1; identify again"),

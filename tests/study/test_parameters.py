@@ -86,7 +86,7 @@ def test_numbers_of_a_model_fitted_before_replace_what_the_study_says():
         ("b_1 = { guess = 1, uncertainty = 1 }\n", "b_1 is estimated from a guess, so uncertainty has no meaning here"),
         ("b_1 = { guess = 1, assumed = true }\n", "so assumed has no meaning here; write value instead of guess"),
         ("b_1 = { value = 1, assumed = true, measured = true }\n", "b_1 is assumed or measured, not both"),
-        ("b_1 = { value = 1, assumed = true, uncertainty = 1 }\n", "b_1 has an uncertainty, so it is known about"),
+        ("b_1 = { value = 1, assumed = true, uncertainty = 1 }\n", "b_1 has an uncertainty, so it was measured"),
         ("b_1 = { guess = 1, min = 2 }\n", "b_1 starts at 1 N s/m, outside its bounds 2 to inf"),
         ("b_1 = { guess = 3, max = 2 }\n", "outside its bounds 0 to 2"),
         ("b_1 = { guess = 2, min = 2, max = 2 }\n", "outside its bounds 2 to 2"),

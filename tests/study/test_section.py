@@ -153,7 +153,7 @@ def test_a_number_beyond_is_refused(value, sentence):
     [
         ("a = 1\nb = \n", "s.toml, line 2: this is not TOML ("),
         ("a = [1,\n", "this is not TOML ("),
-        ("a = " + "[" * 3000, "a study holds numbers of a few digits and lists in lists"),
+        ("a = " + "[" * 3000, "brackets nested hundreds deep"),
     ],
 )
 def test_what_is_no_toml_is_told_with_its_line(text, sentence):

@@ -62,7 +62,7 @@ class Sensors:
         if np.linalg.cond(S) > ALIKE:
             last = next(name for name in reversed(names) if self.by_coordinate[name][0].of)
             raise self.by_coordinate[last][1].error(
-                "expression", f"the sensors of {', '.join(names)} do not tell these coordinates apart: one measures"
+                "expression", f"the sensors of {', '.join(names)} do not determine these coordinates: one measures"
                 " what others do already; give each its own column and sum, or state the plant in what is measured",
             )  # fmt: skip
         inverse = np.linalg.inv(S)
@@ -105,6 +105,6 @@ class Sensors:
     def _untold(self, name: str, other: str) -> Exception:
         sensor, place = self.by_coordinate[name]
         return place.error(
-            "expression", f"'{sensor.column}' measures {place.values['expression']}, and nothing tells {other}: add"
+            "expression", f"'{sensor.column}' measures {place.values['expression']}, no sensor determines {other}: add"
             f" [sensors.{other}], lock {other} in this run, or state the plant in what is measured",
         )  # fmt: skip

@@ -146,7 +146,7 @@ def read_parameter(section: Section, key: str, name: str, what: Quantity) -> Par
         if assumed and measured:
             raise table.error("assumed", f"{name} is assumed or measured, not both; leave one out")
         if assumed and sigma > 0:
-            raise table.error("assumed", f"{name} has an uncertainty, so it is known about, not assumed; leave one out")
+            raise table.error("assumed", f"{name} has an uncertainty, so it was measured, not assumed; leave one out")
         lower, upper = _bounds(section, key, table, what, (-math.inf, math.inf))
         if not lower <= number <= upper:
             raise table.error(

@@ -183,7 +183,7 @@ def read_fit(path: Path) -> StoredFit:
     except BadInput:
         raise
     except (UnicodeDecodeError, ValueError, RecursionError):
-        raise BadInput(f"{path} is no fit.json; the first argument is the file that `upright identify` wrote") from None
+        raise BadInput(f"{path} is not a fit.json; the first argument is what `upright identify` wrote") from None
     wanted = ("plant", "parameters")
     if not isinstance(content, dict) or any(key not in content for key in wanted):
         raise BadInput(f"{path} lacks the keys {', '.join(wanted)} of a fit.json; write it with `upright identify`")
@@ -316,7 +316,7 @@ def _bands(entry: Any) -> Bands:
         raise BadInput(f"bands.covariance must have {len(names)} rows of as many numbers, one for each of bands.names")
     covariance = np.array(rows).reshape(len(names), len(names))
     if names and np.linalg.eigvalsh(_scaled(covariance))[0] < -1e-6:
-        raise BadInput("bands.covariance must be that of some numbers, so none of its variances may be negative")
+        raise BadInput("bands.covariance must be a covariance, so none of its variances may be negative")
     return Bands(
         quantile=_positive(table.get("quantile"), "bands.quantile"), level=_positive(table.get("level"), "bands.level"),
         spreads=spreads, names=tuple(names), covariance=covariance,
@@ -413,7 +413,7 @@ def _text(value: Any, place: str) -> str:
 
 def _number(value: Any, place: str, largest: float = LARGEST) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= largest:
-        raise BadInput(f"{place} must be a finite number of a rig's size, got {_shown(value)}")
+        raise BadInput(f"{place} must be a finite number of a plausible size, got {_shown(value)}")
     return float(value)
 
 

@@ -63,8 +63,8 @@ class StudyText:
             ) from None
         except (ValueError, RecursionError):  # a number of 5000 digits, a list in 1000 lists
             raise BadInput(
-                f"{path}: a study holds numbers of a few digits and lists in lists, and this one a number of thousands"
-                " of digits or brackets in hundreds of brackets; write what is meant"
+                f"{path}: this study has a number of thousands of digits, or brackets nested hundreds deep; a study"
+                " needs neither"
             ) from None
         self.lines = key_lines(self.text)
 
