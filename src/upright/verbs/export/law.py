@@ -91,7 +91,7 @@ def write_law(made: SampledController, name: str, target: LawTarget, at: Path | 
         title=f"{made.title} for {target.name}", verdict=f"{name} is written for {target.name}; {exact}.",
         parts=(Part("What it takes and gives", (Points(tuple(made.facts)),)),), warnings=tuple(warnings),
         steps=(
-            Step("Let it test itself where it will run.", target.test.format(folder=typed(at or Path()))),
+            Step("Run its self-test on the computer that will run it.", target.test.format(folder=typed(at or Path()))),
             Step(target.onward),
         ),
         numbers={
