@@ -106,7 +106,7 @@ def test_least_cost_uses_up_the_limit(study, tmp_path):
     outcome = design(study, "--lqr", "1,0,1,0", "--limit", "0.5", "--start", "theta=4 deg", "--json", "-o", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
     assert json.loads(outcome.stdout)["peak_command"] == pytest.approx(0.5, rel=1e-6)
-    assert "as the effort gets cheaper" in (tmp_path / "design.html").read_text(encoding="utf-8")
+    assert "as the effort weight falls" in (tmp_path / "design.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
