@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -236,17 +237,24 @@ def test_provenance_names_the_content() -> None:
     assert read_source(source(data)).provenance.sha256 == hashlib.sha256(data).hexdigest()
 
 
-def test_two_megabytes_are_read_in_half_a_second() -> None:
-    from time import perf_counter
+def test_two_megabytes_are_read_in_a_few_times_what_numpy_takes() -> None:
+    """Row by row it would be twenty times; a ratio, since machines differ by as much."""
+    from io import StringIO
+    from time import process_time
 
     data = logs.named_csv(30_000)
     assert len(data) > 2e6
-    best = 1e9
-    for _ in range(3):
-        start = perf_counter()
-        read_source(source(data))
-        best = min(best, perf_counter() - start)
-    assert best < 0.5
+
+    def least(call: Callable[[], object]) -> float:
+        spent = []
+        for _ in range(3):
+            start = process_time()
+            call()
+            spent.append(process_time() - start)
+        return min(spent)
+
+    alone = least(lambda: np.loadtxt(StringIO(data.decode()), delimiter=",", skiprows=1))
+    assert least(lambda: read_source(source(data))) < 6 * alone
 
 
 SWING_T = np.arange(200) * 0.01

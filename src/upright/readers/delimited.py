@@ -1,19 +1,21 @@
 """Record of a table of numbers, with or without a line of names; and of a record that this package wrote as text.
 
 Commas, semicolons, tabs or blanks part the cells; names stand in the line above the numbers, perhaps after
-a ``#`` or ``%``. Without names the columns are c0, c1, ... and c0 is the time when it increases. The first column may
-hold dates and times of day.
+a ``#`` or ``%``, a line of units under them. Without names the columns are c0, c1, ... and c0 is the time when it
+increases. The first column may hold dates and times of day, and numbers may have names and units beside them.
 """
 
 from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
+from upright.readers.labelled import Label, bare_rows, without_arrival
 from upright.readers.reader import READERS, Reader
-from upright.readers.resolution import exact_seconds, is_epoch, is_index, rebuild
+from upright.readers.resolution import epoch_digits, exact_seconds, is_epoch, is_index, rebuild
 from upright.readers.source import Source, TextTable
 from upright.readers.stamps import in_seconds
 from upright.records import Array, Record
@@ -34,7 +36,9 @@ def layout(source: Source, text: str | None = None) -> TextTable:
         When no line begins with a number, or a name stands above two columns.
     """
     given = source.text if text is None else text
-    text, began = in_seconds(given)
+    sent, arrived = without_arrival(given)
+    stamped, began = in_seconds(sent)
+    text, labels = bare_rows(stamped)
     lines = _first_lines(text)
     first = next((i for i, line in enumerate(lines) if begins_with_number(line)), -1)
     if first < 0:
@@ -44,12 +48,12 @@ def layout(source: Source, text: str | None = None) -> TextTable:
             line=1,
         )
     above = [i for i in range(first) if lines[i].strip()]
-    candidates = [lines[i].strip() for i in above]
+    candidates = [lines[i].strip(" ") for i in above]
     delimiter = _delimiter(lines[first], candidates[-1] if candidates else "")
     if delimiter and _trails(lines[first], candidates[-1] if candidates else "", delimiter):
         return layout(source, re.sub(rf"{re.escape(delimiter)}[ \t]*$", "", given, flags=re.MULTILINE))
     width = len(lines[first].split(delimiter))
-    names = _split(re.sub(r"^[#%]+\s*", "", candidates[-1]), delimiter) if candidates else []
+    names = _names(candidates, lines[first], delimiter, labels)
     if names and len(names) != width and not candidates[-1].startswith(("#", "%")):
         raise source.bad(
             f"expected a name for each of the {width} columns below, got {len(names)};"
@@ -79,7 +83,28 @@ def layout(source: Source, text: str | None = None) -> TextTable:
         decimal_comma=comma,
         named=named,
         began=began,
+        arrived=arrived,
     )
+
+
+def _names(above: Sequence[str], row: str, delimiter: str | None, labels: Sequence[Label]) -> list[str]:
+    """Names of columns, with the units that stand in a line of their own or beside each number."""
+    rows = [_split(re.sub(r"^[#%]+\s*", "", line), _delimiter(row, line)) for line in above[-2:]]
+    names = rows[-1] if rows else []
+    units = [unit for _, unit in labels]
+    if any(name for name, _ in labels):
+        names = [name for name, _ in labels]
+    elif len(rows) > 1 and len(rows[0]) == len(names) and _are_units(names):
+        names, units = rows[0], [unit.strip("()[] ") for unit in names]
+    if len(names) != len(units) or any(map(stated_unit, names)):
+        return names
+    return [f"{name} ({unit})" if name and unit else name for name, unit in zip(names, units, strict=True)]
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether a line says in which unit each column is: a time the first, and the others where they have one."""
+    units = [cell.strip("()[] ") for cell in cells]
+    return bool(stated_time_unit(f"({units[0]})")) and all(stated_unit(f"({unit})") for unit in units if unit)
 
 
 def _first_lines(text: str) -> list[str]:
@@ -100,6 +125,10 @@ def read(source: Source) -> Record:
     notes: list[str] = []
     if text.began:
         notes.append(f"Time is counted from the first sample, {text.began}.")
+        if text.arrived:
+            notes.append(
+                "Its times are those at which lines arrived, which a buffer shifts; log the board's own clock."
+            )
     elif not text.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
     elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
@@ -108,9 +137,8 @@ def read(source: Source) -> Record:
     if is_epoch(t) and seconds == 1:
         rows = [line for line in text.body.split("\n") if line.strip()]
         cells = [row.split(text.delimiter)[at] for row in rows]
-        t, first = exact_seconds(
-            source, cells, range(text.first_line, text.first_line + len(cells)), name=text.names[at], column=at + 1
-        )
+        lines = range(text.first_line, text.first_line + len(cells))
+        t, first = exact_seconds(source, cells, lines, name=text.names[at], column=at + 1, digits=epoch_digits(t))
         notes.append(f"Time is counted from the first sample, epoch {first * 1e-9:.6f} s.")
     source.must_increase(
         t,
@@ -169,7 +197,7 @@ def _trails(row: str, header: str, delimiter: str) -> bool:
 
 def _split(line: str, delimiter: str | None) -> list[str]:
     if delimiter is None:
-        wide = re.split(r"\s{2,}", line)  # names may hold single blanks
+        wide = re.split(r"\s{2,}", line.strip())  # names may hold single blanks
         return [name.strip('"') for name in (wide if len(wide) > 1 else line.split())]
     try:
         cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])

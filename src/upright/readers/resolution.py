@@ -38,12 +38,21 @@ def is_epoch(t: Array) -> bool:
     return t.size > 0 and abs(float(t[0])) > _EPOCH
 
 
+def epoch_digits(t: Array) -> int:
+    """Digits behind the second of stamps without a point: 3 where they count milliseconds since 1970, 6 or 9.
+
+    Of what falls between 2001 and 2106 only.
+    """
+    return next((n for n in (3, 6, 9) if 1e9 < float(t[0]) / 10**n < 2**32), 0)
+
+
 def exact_seconds(
-    source: Source, cells: Sequence[str], lines: Sequence[int], *, name: str, column: int
+    source: Source, cells: Sequence[str], lines: Sequence[int], *, name: str, column: int, digits: int = 0
 ) -> tuple[Array, int]:
     """Seconds (N,) since the first cell, subtracted as whole nanoseconds, and that first cell in nanoseconds.
 
-    An epoch stamp such as 1707681595.547459602 has 19 digits; a float64 keeps 16.
+    A cell counts seconds, or parts of them of so many `digits`. An epoch stamp such as 1707681595.547459602 has 19
+    digits; a float64 keeps 16.
     """
     nanoseconds: list[int] = []
     for text, line in zip(cells, lines, strict=True):
@@ -51,14 +60,14 @@ def exact_seconds(
             value = Decimal(text.strip())
         except InvalidOperation:
             value = Decimal("nan")
-        if not (value.is_finite() and value.copy_abs() < 10**15):
+        if not (value.is_finite() and value.copy_abs() < 10 ** (15 + digits)):
             raise source.bad(
                 f"expected a time stamp in s, got {text.strip()[:40]!r}; mend or delete the row",
                 line=line,
                 column=column,
                 name=name,
             )
-        nanoseconds.append(int(value.scaleb(9)))
+        nanoseconds.append(int(value.scaleb(9 - digits)))
     first = nanoseconds[0]
     return np.array([value - first for value in nanoseconds], dtype=np.float64) * 1e-9, first
 

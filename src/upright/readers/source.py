@@ -144,6 +144,8 @@ class TextTable:
         Whether the log itself names its columns.
     began : str
         Date and time of the first row, where the first column holds such instead of seconds.
+    arrived : bool
+        Whether these are the times at which a computer got the rows.
     """
 
     source: Source
@@ -155,6 +157,7 @@ class TextTable:
     decimal_comma: bool = False
     named: bool = True
     began: str = ""
+    arrived: bool = False
 
     @property
     def body(self) -> str:
