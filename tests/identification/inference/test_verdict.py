@@ -190,6 +190,25 @@ def test_numbers_that_all_scale_with_an_assumed_gain_are_known_as_ratios(frictio
     assert headline in usable.headline
 
 
+@pytest.mark.parametrize("counts", [500.0, 2000.0])
+def test_a_length_that_rests_on_counts_nobody_knows_is_not_called_known(counts: float) -> None:
+    """The period of a swing of 1 rad says the length, and that of 4 counts read as 1 another one."""
+    question = rig(Pendulum, PENDULUM, {"l_cg": 0.2, "b_2": 1e-3})
+    inertia = replace(question.parameters["J_p"], value=0.0, assumed=True, estimate=False)
+    question = replace(
+        question, parameters=question.parameters | {"J_p": inertia},
+        assumed_scales={"sensors.theta.counts_per_rev": counts},
+    )  # fmt: skip
+    run = noisy(swing(angle=1.0), 1e-3, seed=11)
+    read = replace(run, y=run.y * 2000.0 / counts)
+    usable = identify(question, [read]).answers[1]
+    assert "Known all the same" not in usable.headline
+    assert (
+        "Known all the same: J_A/(m_p l_cg) ="
+        in identify(replace(question, assumed_scales={}), [run]).answers[1].headline
+    )
+
+
 def test_a_guessed_plant_is_a_guess_until_a_prediction_confirms_it() -> None:
     question = replace(rig(Pendulum, PENDULUM, {"J_p": 3e-3, "b_2": 1e-3}), guessed=True)
     run, other = noisy(swing(), 1e-3, seed=11), replace(noisy(swing(angle=1.0), 1e-3, seed=12), label="other")

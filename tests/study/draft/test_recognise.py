@@ -71,6 +71,8 @@ FURUTA = "Two angles were taken for arm and pendulum of a Furuta pendulum."
          f"Column 'c1' says neither unit nor kind; it was {AS_CARTS}-1 looks the same{HANGS}."),
         ([COUNTS[0], col("c1")], None, "rectilinear-2",
          f"Column 'c1' says neither unit nor kind; it was {AS_CARTS}-2 looks the same."),
+        ([col("theta", "counts")], None, "pendulum",
+         "Counts of 'theta' were taken for the angle of a pendulum, by its name; torsional-1 looks the same."),
         ([ANGLES[0], LENGTHS[0]], None, "cart-pendulum", ""),
         ([ANGLES[0], LENGTHS[1]], DRIVE, "cart-pendulum", ""),
         ([ANGLES[0], col("d", "deg")], None, "furuta", FURUTA),

@@ -375,10 +375,15 @@ DETERMINED = ("well determined", "rests on", "tied to")
 
 
 def _ratios(evidence: Evidence) -> dict[str, Estimate]:
-    """What is known whatever the assumed numbers are, of what the data determine."""
+    """What is known whatever the assumed numbers are, of what the data determine.
+
+    Nothing in SI that rests on a number whose effect nobody evaluated; what is in its own counts does not.
+    """
+    unevaluated = {a.name for a in evidence.assumptions if any(map(math.isnan, a.follows.values()))}
     return {
         name: e for a in evidence.assumptions for name, e in a.ratios.items()
         if e.status.startswith(DETERMINED) and e.half < 1
+        and (name.partition("/")[0] in a.without or unevaluated.isdisjoint(e.rests_on))
     }  # fmt: skip
 
 

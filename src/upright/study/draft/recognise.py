@@ -237,6 +237,11 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     counts = [c for c in places if c.guess in ("counts", "")]
     angles = [c for c in places if c.guess in ANGLES]
     bodies = min(len(counts), 3)
+    turning = [c.name for c in counts if _TURNS.search(bare_name(c.name)) and not _DISK.search(bare_name(c.name))]
+    if len(counts) == 1 == len(turning) and not angles and not lengths:
+        return "pendulum", (
+            f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name; torsional-1 looks the same."
+        )
     if counts and not angles and not lengths:
         kind = "torsional" if any(_DISK.search(bare_name(c.name)) for c in counts) else "rectilinear"
         other = "rectilinear" if kind == "torsional" else "torsional"
@@ -251,7 +256,6 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
         )
     if lengths and angles:
         return "cart-pendulum", ""
-    turning = [c.name for c in counts if _TURNS.search(bare_name(c.name))]
     if lengths and turning:
         return "cart-pendulum", f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name."
     if len(angles) >= 2:
