@@ -50,8 +50,10 @@ class _Row:
         self.bracketed = inside[:1] in _BRACKETS and inside[-1:] == _BRACKETS[inside[:1]]
         inside = inside[1:-1] if self.bracketed else inside
         self.apart = next((mark for mark in ";\t," if mark in inside), "")
-        found = [_CELL.fullmatch(cell) for cell in (inside.split(self.apart) if self.apart else _BESIDE.split(inside))]
-        self.cells = [cell for cell in found if cell] if all(found) else []
+        matches = [
+            _CELL.fullmatch(cell) for cell in (inside.split(self.apart) if self.apart else _BESIDE.split(inside))
+        ]
+        self.cells = [cell for cell in matches if cell] if all(matches) else []
 
     @property
     def labels(self) -> tuple[Label, ...]:
