@@ -173,6 +173,7 @@ def svg(drawing: Figure, name: str) -> str:
     """Markup of a figure to stand inside a page; ids begin with `name`, so that several figures can share it."""
     page = StringIO()
     with _undisturbed():
+        _lay_out(drawing)
         drawing.savefig(
             page, format="svg", transparent=True, metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
         )
@@ -195,6 +196,14 @@ def svg(drawing: Figure, name: str) -> str:
     share = 100 * min(1.0, drawing.get_figwidth() / WIDTH)
     drawn = f'font-family="{_FAMILY}" style="max-width:{share:.0f}%" aria-hidden="true" focusable="false"'
     return f"{responsive} {drawn}{text[len(opening) :]}"
+
+
+def _lay_out(drawing: Figure) -> None:
+    """Lay a figure out for good; left to it, `Figure.savefig` draws it whole for that and then once more."""
+    engine = drawing.get_layout_engine()
+    if engine is not None:
+        engine.execute(drawing)
+        drawing.set_layout_engine(None)
 
 
 def _short(path: re.Match[str]) -> str:
