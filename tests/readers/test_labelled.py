@@ -65,6 +65,21 @@ def test_the_time_of_arrival_gives_way_to_the_clock_of_the_board():
     np.testing.assert_allclose(labelled.t, T, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-6])
+def test_the_time_of_arrival_says_what_a_clock_without_a_name_counts(unit):
+    digits = round(-np.log10(unit))
+    log = record(rows(lambda t, a, n: f"{ARRIVED[round(100 * t)]}{t / unit:.{max(2 - digits, 0)}f},{a:.4f},{n}"))
+    np.testing.assert_allclose(log.t, T, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(log["c1"], THETA)
+    assert f"counts {unit:g} s" in str(log.provenance)
+
+
+def test_an_angle_that_grows_is_no_clock():
+    log = record(rows(lambda t, a, n: f"{ARRIVED[round(100 * t)]}{7.3 * t:.3f},{a:.4f}"))
+    np.testing.assert_allclose(log.t, np.round(1.003 * T, 3), rtol=0, atol=5e-4)
+    np.testing.assert_allclose(log["c1"], 7.3 * T, rtol=0, atol=1e-3)
+
+
 @pytest.mark.parametrize("label", ["", "theta:"])
 def test_where_a_board_sends_no_clock_the_time_is_that_of_arrival_and_the_log_says_so(label):
     log = record(rows(lambda t, a, n: f"{ARRIVED[round(100 * t)]}{label}{a:.4f}"))

@@ -36,7 +36,7 @@ def layout(source: Source, text: str | None = None) -> TextTable:
         When no line begins with a number, or a name stands above two columns.
     """
     given = source.text if text is None else text
-    sent, arrived = without_arrival(given)
+    sent, arrival = without_arrival(given)
     stamped, began = in_seconds(sent)
     text, labels = bare_rows(stamped)
     lines = _first_lines(text)
@@ -83,7 +83,7 @@ def layout(source: Source, text: str | None = None) -> TextTable:
         decimal_comma=comma,
         named=named,
         began=began,
-        arrived=arrived,
+        arrival=arrival,
     )
 
 
@@ -125,10 +125,12 @@ def read(source: Source) -> Record:
     notes: list[str] = []
     if text.began:
         notes.append(f"Time is counted from the first sample, {text.began}.")
-        if text.arrived:
+        if text.arrival == 0:
             notes.append(
                 "Its times are those at which lines arrived, which a buffer shifts; log the board's own clock."
             )
+    elif text.arrival:
+        notes.append(f"The first column is a clock that counts {text.arrival:g} s, as the times of arrival say.")
     elif not text.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
     elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
@@ -209,6 +211,8 @@ def _split(line: str, delimiter: str | None) -> list[str]:
 def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
     if text.began:
         return int((text.delimiter or " ") in text.began), 1.0  # behind a date in a cell of its own
+    if text.arrival:
+        return 0, text.arrival
     for j, name in enumerate(text.names if text.named else ()):
         if seconds := time_scale(name):
             return j, seconds

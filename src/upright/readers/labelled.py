@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from itertools import pairwise
 
 from upright.records.columns import time_scale
 
@@ -21,6 +20,10 @@ _CELL = re.compile(
 )
 _BESIDE = re.compile(r"\s+(?=[^\W\d][^\s:=]*\s*[:=])")
 _ARRIVED = re.compile(r"^(\d\d:\d\d:\d\d[.,]\d{3}) -> ?", re.MULTILINE)
+_ROWS = 1000  # lines that show whether the first column is a clock
+_CLOCKS = (1.0, 1e-3, 1e-6)  # seconds per count
+_LONG, _SAME = 0.05, 0.2  # s and share: lines arrive some 10 ms late, and no two clocks are so alike
+_APART = r"[,;\t]|\s+"
 _BRACKETS = {"(": ")", "[": "]", "{": "}"}
 
 Label = tuple[str, str]
@@ -64,27 +67,40 @@ class _Row:
         return (self.apart or " ").join(cell["number"] for cell in self.cells)
 
 
-def without_arrival(text: str) -> tuple[str, bool]:
-    """The text without the times at which a monitor got its lines, and whether these are its only clock, and stay."""
+def without_arrival(text: str) -> tuple[str, float | None]:
+    """The text without the times at which a monitor got its lines, where the board sends a clock of its own.
+
+    And the seconds per unit of the first column, where these times say that it is this clock; 0 where they are the only
+    one, and stay; nothing where there are none, or a column is called a time.
+    """
     if _ARRIVED.search(text, 0, 4096) is None:
-        return text, False
-    sent = _ARRIVED.sub("", text)
-    if _has_clock(sent):
-        return sent, False
-    apart = next((mark for mark in ";\t," if mark in sent[:4096]), ";")
-    return _ARRIVED.sub(rf"\1{apart}", text), True
-
-
-def _has_clock(text: str) -> bool:
-    """Whether a column of the first rows is called like a time, or the first of several increases."""
-    rows, labels = bare_rows("\n".join(text.split("\n", 200)[:200]))
-    names = [name for name, _ in labels]
-    first: list[float] = []
-    for row in rows.split("\n"):
-        cells = [cell.strip() for cell in re.split(r"[,;\t]|\s+", row.strip())]
-        if re.fullmatch(_NUMBER, cells[0], re.IGNORECASE):
-            first += [float(cells[0].replace(",", "."))] * (len(cells) > 1)
+        return text, None
+    lines = text.split("\n", _ROWS)[:_ROWS]
+    rows, labels = bare_rows(_ARRIVED.sub("", "\n".join(lines)))
+    names, timed = [name for name, _ in labels], list[tuple[float, list[float]]]()
+    for line, row in zip(lines, rows.split("\n"), strict=True):
+        numbers, arrived = _numbers(row), _ARRIVED.match(line)
+        if numbers and arrived:
+            timed.append((_of_day(arrived[1]), numbers))
         elif not labels:
-            names = cells
-    increases = len(first) > 1 and all(a < b for a, b in pairwise(first))
-    return increases or any(map(time_scale, names))
+            names += re.split(_APART, row.strip())
+    sent = _ARRIVED.sub("", text)
+    if any(map(time_scale, names)):
+        return sent, None
+    if timed and len(timed[0][1]) > 1:
+        elapsed, counted = timed[-1][0] - timed[0][0], timed[-1][1][0] - timed[0][1][0]
+        for unit in _CLOCKS if elapsed > _LONG else ():
+            if abs(counted * unit / elapsed - 1) < _SAME:
+                return sent, unit
+    apart = next((mark for mark in ";\t," if mark in sent[:4096]), ";")
+    return _ARRIVED.sub(rf"\1{apart}", text), 0.0
+
+
+def _numbers(row: str) -> list[float]:
+    cells = [cell.strip().replace(",", ".") for cell in re.split(_APART, row.strip())]
+    return [float(cell) for cell in cells] if all(re.fullmatch(_NUMBER, cell, re.IGNORECASE) for cell in cells) else []
+
+
+def _of_day(clock: str) -> float:
+    hours, minutes, seconds = clock.replace(",", ".").split(":")
+    return 3600 * int(hours) + 60 * int(minutes) + float(seconds)

@@ -144,8 +144,9 @@ class TextTable:
         Whether the log itself names its columns.
     began : str
         Date and time of the first row, where the first column holds such instead of seconds.
-    arrived : bool
-        Whether these are the times at which a computer got the rows.
+    arrival : float, optional
+        Of a monitor that stamped the rows as they arrived: seconds per unit of their first column, as the stamps say; 0
+        where there is no other clock.
     """
 
     source: Source
@@ -157,7 +158,7 @@ class TextTable:
     decimal_comma: bool = False
     named: bool = True
     began: str = ""
-    arrived: bool = False
+    arrival: float | None = None
 
     @property
     def body(self) -> str:
