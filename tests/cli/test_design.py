@@ -152,7 +152,9 @@ def test_a_delay_is_counted_once_and_its_source_is_told(tmp_path, fitted, option
     found = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
     assert found["delay_samples"] == pytest.approx(samples)
     assert found["delay_from"] == said
-    assert f"{samples:.3g} samples late ({said})" in (tmp_path / "design.html").read_text(encoding="utf-8")
+    assert f"{samples:.3g} sample{'s' * (samples != 1)} late ({said})" in (tmp_path / "design.html").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_sampled_gains_meet_the_poles_in_the_loop_as_it_runs(study, tmp_path):

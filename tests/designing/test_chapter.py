@@ -81,7 +81,7 @@ def test_a_loop_that_falls_is_not_sound_and_is_not_taken_anywhere(done):
     falls = with_margins(done, None, peak_sampled=math.inf)
     page = chapter(falls)
     assert chapter(with_margins(done, FINE, peak_sampled=1.0)).sound
-    assert page.verdict.startswith("The sampled loop falls: with a period of 2 ms, 1 samples of delay and the ")
+    assert page.verdict.startswith("The sampled loop falls: with a period of 2 ms, a delay of 1 sample and the ")
     assert not page.sound
     commands = [step.command for step in page.steps]
     assert any("--sampled" in c for c in commands)
@@ -122,7 +122,7 @@ def test_who_says_how_late_a_command_acts_is_told(done):
     late = design_for(ARM.replace(delay="3 ms"), done.request)
     assert late.sampled.delay == pytest.approx(1.5)
     for design, words in (
-        (late, "1.5 samples late (as the file says)"), (done, "1 samples late (assumed)"),
+        (late, "1.5 samples late (as the file says)"), (done, "1 sample late (assumed)"),
         (design_for(ARM, replace(done.request, delay=2.0)), "2 samples late (as requested)"),
     ):  # fmt: skip
         assert words in chapter(design).parts[2].content[0]
