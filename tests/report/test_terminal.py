@@ -31,6 +31,15 @@ def printed(what, *more, width=80, **named):
     return [line.rstrip() for line in stream.getvalue().splitlines()]
 
 
+def test_what_stands_among_the_points_is_not_said_again_in_the_verdict():
+    page = Chapter(
+        title="T", verdict="It holds.", detail="Just so. m = 1 is assumed. Weigh it. No more.",
+        parts=(Part("Assumed", (Points(("m = 1 is assumed. Weigh it.", "so")),)),),
+    )  # fmt: skip
+    *_, verdict = printed(print_chapter, page)
+    assert verdict == "Verdict: It holds. Just so. No more."
+
+
 WIDE = Table(caption="Numbers", headings=("name", "size", "remark"), numbers=(1,),
              rows=(("arm", "1.5", "it moves"), ("rod", "22", "")))  # fmt: skip
 

@@ -149,7 +149,7 @@ RUN = 'role = "fit"\n'
         ('column = "v"\n', f'expression = "{"-" * 1900}v"\n', "nested too deeply"),
         ('column = "v"\n', f'expression = "v{"**2" * 600}"\n', "nested too deeply"),
         ('column = "v"\n', f'expression = "{"(" * 900}v{")" * 900}"\n', "neither a column nor arithmetic"),
-        (RUN, f"{RUN}measured = {'[' * 900}{']' * 900}\n", "brackets in hundreds of brackets"),
+        (RUN, f"{RUN}measured = {'[' * 900}{']' * 900}\n", "brackets nested hundreds deep"),
         (RUN, f"{RUN}score_from = {'9' * 5000}\n", "thousands of digits"),
         (RUN, f"{RUN}period = 1e-9\n", "8 s in steps of 1e-09 s are 8e[+]09 samples, and a run may have 1e[+]07"),
         (RUN, f"{RUN}horizon = [{', '.join(f'{0.02 + 0.001 * i:.3f}' for i in range(2000))}]\n", "lists 2000 times"),

@@ -182,7 +182,8 @@ class Designed:
         if way.margins is None:
             return (
                 f"The sampled loop falls: with a period of {1e3 * self.request.period:.4g} ms, "
-                f"a delay of {self.sampled.delay:.3g} sample{'s' * (self.sampled.delay != 1)} and the {way.name} the gains do not stabilize. "
+                f"a delay of {self.sampled.delay:.3g} sample{'s' * (self.sampled.delay != 1)} and the {way.name} the gains "
+                "do not stabilize. "
                 "Sample faster, ask for slower poles, or design for the sampled loop (--sampled)."
             )
         thin = self._reservations(way.margins)

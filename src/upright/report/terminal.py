@@ -27,6 +27,7 @@ def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = (), tit
     if title:
         screen.print(title, soft_wrap=not screen.is_terminal, markup=False)
     folded = [part.title for part in chapter.parts if page and part.folded and not part.aside]
+    detail = chapter.detail
     for part in chapter.parts:
         if page and part.folded:
             continue
@@ -37,8 +38,9 @@ def print_chapter(screen: Any, chapter: Chapter, files: Sequence[Path] = (), tit
                 if i and isinstance(block, Table):
                     screen.print()
                 _print(screen, block)
-    verdict = f"{chapter.verdict} {chapter.detail}".strip()
-    _say(screen, "\nVerdict", verdict)
+                for point in block.sentences if isinstance(block, Points) else ():
+                    detail = detail.replace(point, "") if point.endswith(".") else detail  # it stands above
+    _say(screen, "\nVerdict", " ".join(f"{chapter.verdict} {detail}".split()))
     for warning in chapter.warnings:
         _say(screen, "Warning", warning)
     _say(screen, "\nWritten", ", ".join(map(str, files)))
