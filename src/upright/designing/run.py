@@ -182,8 +182,8 @@ class Designed:
         if way.margins is None:
             samples = f"{self.sampled.delay:.3g} sample{'s' * (self.sampled.delay != 1)}"
             return (
-                f"The sampled loop falls: with a period of {1e3 * self.request.period:.4g} ms, a delay of {samples} and "
-                f"the {way.name} the gains do not stabilize. "
+                f"The sampled loop falls: with a period of {1e3 * self.request.period:.4g} ms, a delay of {samples} "
+                f"and the {way.name} the gains do not stabilize. "
                 "Sample faster, ask for slower poles, or design for the sampled loop (--sampled)."
             )
         thin = self._reservations(way.margins)
