@@ -74,6 +74,11 @@ def read(source: Source) -> Record:
     content = variables(source)
     if KEY in content and {"t", "signals", "names"} <= set(content):
         return _written_by_us(source, content)
+    return record_of(source, content, reader="matlab")
+
+
+def record_of(source: Source, content: Variables, *, reader: str) -> Record:
+    """Record of those variables that are signals on a time; what is a setting becomes a note."""
     pieces = _pieces(source, content) or _structures(content) or _vectors(source, content)
     if pieces is None or not pieces[1]:
         pieces = _vectors(source, _lifted(content)) or _table(content)
@@ -93,7 +98,7 @@ def read(source: Source) -> Record:
     return Record(
         t=t,
         signals=signals,
-        provenance=source.provenance("matlab", *filter(None, [note]), *notes, *_settings(content)),
+        provenance=source.provenance(reader, *filter(None, [note]), *notes, *_settings(content)),
     )
 
 

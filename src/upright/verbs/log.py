@@ -115,7 +115,8 @@ def show_logs(
     """Print and draw what a log holds: columns, sample rate, resolution, gaps, mislabelled columns.
 
     Readable are ECP exports, text with or without names (tables, serial plotters and monitors, JSON lines), MATLAB
-    version 5, CSV exports of ROS bags and upright's own logs of runs (MCAP); the format is recognised from the content.
+    version 5, arrays of NumPy, CSV exports of ROS bags and upright's own logs of runs (MCAP); the format is recognised
+    from the content.
 
     Parameters
     ----------
