@@ -271,9 +271,11 @@ def _conclude(
     brief = values or end.interrupted or bool(best.lost)
     little = explains_little(problem, end)
     if little and not brief:
+        guessed = [f"{name}, which is assumed" for name in problem.rig.assumed_scales]
         warnings.append(
             "The search stopped after its first pass, because the model explains less than two thirds of how the "
-            "signals vary; intervals come from standard errors. Look at units, signs and the plant first."
+            "signals vary; intervals come from standard errors. Look first at "
+            f"{', '.join([*guessed, 'units, signs and the plant'])}."
         )
     estimates = shared_estimates(best, identifiable.hidden, log, profiles=not (brief or little))
     per_run, groups = run_estimates(best)

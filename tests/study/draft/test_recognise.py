@@ -73,6 +73,14 @@ FURUTA = "Two angles were taken for arm and pendulum of a Furuta pendulum."
          f"Column 'c1' says neither unit nor kind; it was {AS_CARTS}-2 looks the same."),
         ([col("theta", "counts")], None, "pendulum",
          "Counts of 'theta' were taken for the angle of a pendulum, by its name; torsional-1 looks the same."),
+        ([col("arm", "counts"), col("pend", "counts")], DRIVE, "furuta",
+         "Counts of 'pend' were taken for the angle of a pendulum, by its name, and those of 'arm' for its arm's; "
+         "cart-pendulum looks the same."),
+        ([col("pole", "counts"), col("cart_pos", "counts")], DRIVE, "cart-pendulum",
+         "Counts of 'pole' were taken for the angle of a pendulum, by its name, and those of 'cart_pos' for its cart's "
+         "place."),
+        ([col("theta1", "counts"), col("theta2", "counts")], DRIVE, "torsional-2",
+         "Counts of 2 encoders were taken for a torsional chain; rectilinear-2 looks the same."),
         ([ANGLES[0], LENGTHS[0]], None, "cart-pendulum", ""),
         ([ANGLES[0], LENGTHS[1]], DRIVE, "cart-pendulum", ""),
         ([ANGLES[0], col("d", "deg")], None, "furuta", FURUTA),

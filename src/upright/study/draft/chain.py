@@ -7,6 +7,7 @@ gain of 1 (or, for a free swing, an inertia of 1) the slopes are the numbers of 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -113,7 +114,11 @@ def _factor(log: ChainLog, plant: type[Plant], name: str) -> float:
 def _volts(c: Column) -> tuple[str, float]:
     """Unit of the command and its factor on the column: a loop's output in counts is the converter's."""
     unit, scale = command_unit(c)
-    return ("V", 1 / DAC_COUNTS_PER_VOLT) if c.guess == "counts" else (unit or "V", scale)
+    return ("V", 1 / DAC_COUNTS_PER_VOLT) if _of_converter(c) else (unit or "V", scale)
+
+
+def _of_converter(c: Column) -> bool:
+    return in_dac_counts(c) or (c.guess == "counts" and not re.search("pwm|duty", c.name, re.IGNORECASE))
 
 
 def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts:
@@ -125,7 +130,7 @@ def _starts_of(record: Record, log: ChainLog, plant: type[Plant]) -> ChainStarts
     if drive is not None:
         scale = _volts(drive)[1]
         u = record[drive.name][rows] * (-scale if log.recognised.reversed else scale)
-        reach = REACH if drive.guess == "counts" or in_dac_counts(drive) else np.inf
+        reach = REACH if _of_converter(drive) else np.inf
     return starts(
         record.t[rows],
         u,

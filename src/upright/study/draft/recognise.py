@@ -23,6 +23,7 @@ _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u
 REFERENCE = re.compile(r"target|reference|\bref\b|commanded|set.?point", re.IGNORECASE)
 _ARM = re.compile(r"arm|psi|joint0|base|motor", re.IGNORECASE)
 _CART = re.compile(r"cart|pos|^[xz]\d?$|distance|displacement", re.IGNORECASE)
+_PENDULUM = re.compile(r"pend|pole", re.IGNORECASE)
 _TURNS = re.compile(r"pend|angle|theta|pole|tilt", re.IGNORECASE)
 _SI = ANGLES | LENGTHS
 _COORDINATES = ("psi", "theta", "x")
@@ -238,10 +239,15 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     angles = [c for c in places if c.guess in ANGLES]
     bodies = min(len(counts), 3)
     turning = [c.name for c in counts if _TURNS.search(bare_name(c.name)) and not _DISK.search(bare_name(c.name))]
-    if len(counts) == 1 == len(turning) and not angles and not lengths:
-        return "pendulum", (
-            f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name; torsional-1 looks the same."
-        )
+    if turning and not angles and not lengths and len(counts) < 3:
+        by_name = f"Counts of '{turning[0]}' were taken for the angle of a pendulum, by its name"
+        others = [c.name for c in counts if c.name != turning[0]]
+        if not others:
+            return "pendulum", f"{by_name}; torsional-1 looks the same."
+        if _CART.search(bare_name(others[0])):
+            return "cart-pendulum", f"{by_name}, and those of '{others[0]}' for its cart's place."
+        if _ARM.search(bare_name(others[0])) or _PENDULUM.search(turning[0]):
+            return "furuta", f"{by_name}, and those of '{others[0]}' for its arm's; cart-pendulum looks the same."
     if counts and not angles and not lengths:
         kind = "torsional" if any(_DISK.search(bare_name(c.name)) for c in counts) else "rectilinear"
         other = "rectilinear" if kind == "torsional" else "torsional"
