@@ -8,7 +8,6 @@ gain of 1 (or, for a free swing, an inertia of 1) the slopes are the numbers of 
 from __future__ import annotations
 
 import re
-import re
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
