@@ -212,6 +212,8 @@ def test_degrees_that_were_guessed_are_doubted():
     record = log(theta=passages(5))
     sentence = "'theta' swings to and fro by more than half a turn in rad: taken for degrees."
     assert sentence in recognise(record, inspect(record)).doubts
+    named = log(theta_deg=np.degrees(passages(5)))  # its name says so
+    assert not any("taken for degrees" in doubt for doubt in recognise(named, inspect(named)).doubts)
 
 
 def test_converter_counts_are_known_by_their_sentence():

@@ -93,7 +93,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         plant, doubt = plant_of(positions, drive)
         doubts += [doubt] if doubt else []
     columns, missing = _assign(find(plant), positions)
-    degrees = [c.name for c in columns.values() if c.guess == "deg" and not c.unit]
+    degrees = [c.name for c in columns.values() if c.guess == "deg" and inspection.column(c.name).guess == "rad"]
     doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
     last = record[list(columns.values())[-1].name]
