@@ -18,7 +18,6 @@ from upright.readers.source import Source
 from upright.records import Record
 
 _ONE, _SEVERAL = b"\x93NUMPY", b"PK\x03\x04"
-_ANYWAY, _RATIO = 32 << 20, 100  # bytes that any file may unpack to; times its own size: a bomb has 1000
 
 
 def _recognises(source: Source) -> bool:
@@ -52,7 +51,7 @@ def _arrays(source: Source) -> dict[str, NDArray[Any]]:
         return {"array": _array(source.data)}
     with ZipFile(BytesIO(source.data)) as file:
         members = [member for member in file.infolist() if member.filename.endswith(".npy")]
-        if sum(member.file_size for member in members) > max(_ANYWAY, _RATIO * len(source.data)):
+        if sum(member.file_size for member in members) > source.most_unpacked << 20:
             raise source.bad("it would unpack to more than any log holds; save its arrays again")
         return {member.filename.removesuffix(".npy"): _array(file.read(member)) for member in members}
 

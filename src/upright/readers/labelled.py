@@ -52,7 +52,7 @@ class _Row:
         inside = line.strip().removesuffix(",")
         self.bracketed = inside[:1] in _BRACKETS and inside[-1:] == _BRACKETS[inside[:1]]
         inside = inside[1:-1] if self.bracketed else inside
-        self.apart = next((mark for mark in ";\t," if mark in inside), "")
+        self.apart = _mark(inside)
         matches = [
             _CELL.fullmatch(cell) for cell in (inside.split(self.apart) if self.apart else _BESIDE.split(inside))
         ]
@@ -92,8 +92,12 @@ def without_arrival(text: str) -> tuple[str, float | None]:
         for unit in _CLOCKS if elapsed > _LONG else ():
             if abs(counted * unit / elapsed - 1) < _SAME:
                 return sent, unit
-    apart = next((mark for mark in ";\t," if mark in sent[:4096]), ";")
-    return _ARRIVED.sub(rf"\1{apart}", text), 0.0
+    return _ARRIVED.sub(rf"\1{_mark(sent[:4096]) or ';'}", text), 0.0
+
+
+def _mark(text: str) -> str:
+    """What parts cells; nothing where blanks do."""
+    return next((mark for mark in ";\t," if mark in text), "")
 
 
 def _numbers(row: str) -> list[float]:

@@ -45,8 +45,6 @@ _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f
 _TEXTS = {4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32", 2: "latin-1", 1: "latin-1"}
 _CELLS, _STRUCTURE, _OBJECT, _TEXT, _SPARSE, _LAST = 1, 2, 3, 4, 5, 15  # classes; between the last two are numbers
 _DEEPEST = 16
-_MOST = 512  # MB that a file may unpack to; a log of an hour at 1 kHz has 30 per column
-_ANYWAY, _RATIO = 32, 100  # MB that any file may; times its own size: logs pack 2 to 20 times, a bomb 1000 times
 _SLICE = 1 << 16  # bytes unpacked at a time, into some 66 MB at most
 _PART = 200  # bytes that the smallest variable or field takes in memory
 
@@ -139,7 +137,7 @@ class _Walk:
     def __init__(self, source: Source, order: str) -> None:
         self.source, self.order = source, order
         self.tag = Struct(order + "II")
-        self.most = min(_MOST, _ANYWAY + _RATIO * len(source.data) // (1 << 20))
+        self.most = source.most_unpacked
         self.left = self.most << 20
 
     def spend(self, size: int) -> None:

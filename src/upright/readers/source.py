@@ -19,6 +19,8 @@ from upright.records import LARGEST, Array, PathLike, Provenance
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0e-\x1f\x7f]")
 _PRINTABLE = bytes(code for code in range(256) if not _UNPRINTABLE.match(chr(code)))
+_MOST = 512  # MB that a file may unpack to; a log of an hour at 1 kHz has 30 per column
+_ANYWAY, _RATIO = 32, 100  # MB that any file may; times its own size: logs pack 2 to 20 times, a bomb 1000 times
 _BLOCK = 1 << 22  # characters of a table that are read at a time; NumPy needs four bytes for each
 
 
@@ -50,6 +52,11 @@ class Source:
                 column=column,
             )
         return text
+
+    @property
+    def most_unpacked(self) -> int:
+        """Megabytes that packed content may hold, and is refused beyond."""
+        return min(_MOST, _ANYWAY + _RATIO * len(self.data) // (1 << 20))
 
     def provenance(self, reader: str, *notes: str) -> Provenance:
         """Origin of a record that `reader` made of this file."""

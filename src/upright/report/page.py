@@ -134,17 +134,20 @@ class Picture:
         return "chart" if self.answers.startswith('{"chart"') else "traces"
 
     @cached_property
+    def _drawn(self) -> Any:
+        """The figure, which is dearer than its markup; `narrow` takes its own from it and lets it go."""
+        return self.draw() if callable(self.draw) else None
+
+    @cached_property
     def svg(self) -> str:
         """Markup of the drawing."""
         if isinstance(self.draw, str):
             return self.draw
-        drawn = self.draw()
         if self.kind == "chart":
-            return drawn.svg(self.name)
+            return self.draw().svg(self.name)
         from upright.report.drawing import svg
 
-        self.__dict__["_drawn"] = drawn  # dearer than its markup: a phone's is of the same figure
-        return svg(drawn, self.name)
+        return svg(self._drawn, self.name)
 
     @cached_property
     def narrow(self) -> str:
@@ -153,8 +156,8 @@ class Picture:
             return self.phone
         from upright.report.drawing import narrowed, svg
 
-        wide = len(self.svg)
-        drawn = self.__dict__.pop("_drawn")
+        wide, drawn = len(self.svg), self._drawn
+        del self.__dict__["_drawn"]
         if wide > 2 * LARGEST_NARROW or not narrowed(drawn):
             return ""
         text = svg(drawn, f"{self.name}-narrow")
