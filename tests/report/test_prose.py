@@ -108,6 +108,22 @@ def test_a_bar_and_a_blank_line_in_a_value_part_nothing(module):
     assert page.parts[0].content[0].rows == (("|x| ## no part",),)
 
 
+def test_a_part_has_its_key_and_a_step_lines_to_write(module):
+    text = (
+        "# T\n\nV.\n\n## A {first}\n\na\n\n## B {second folded}\n\n![i](drawn) c\n\n## C {aside}\n\nc\n\n## Next\n\n"
+        '- Write it\n  down.\n  ```\n  [runs]\n  label = "{{ said }}"\n\n  upright show\n  ```\n- Look. `upright log`\n'
+    )
+    page = chapter_of(module(text, "prose_keys"), said="a|b", figures={"drawn": (lambda: "paper", lambda: "screen")})
+    assert [(p.title, p.key, p.folded, p.aside) for p in page.parts] == [
+        ("A", "first", False, False), ("B", "second", True, False), ("C", "", False, True),
+    ]  # fmt: skip
+    (picture,) = page.parts[1].content
+    assert (picture.draw(), picture.answers) == ("paper", "screen")
+    assert page.steps == (
+        Step("Write it down.", '[runs]\nlabel = "a|b"\n\nupright show'), Step("Look.", "upright log"),
+    )  # fmt: skip
+
+
 def test_an_expression_that_prints_nothing_parts_no_paragraph(module):
     text = (
         "# T{{ '' }}\n\nOne\n{{ 'never' if not yes }}\n{{ '' }}\ntwo.\n\n## P{{ '' }}\n\n"

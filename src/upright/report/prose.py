@@ -10,7 +10,7 @@ A template is Jinja's over Markdown as far as a chapter has it::
 
     Detail, the others.
 
-    ## Part {folded}
+    ## Part {key folded}
 
     A paragraph.
 
@@ -28,9 +28,14 @@ A template is Jinja's over Markdown as far as a chapter has it::
     ## Next
 
     - What to do. `command`
+    - What to write.
+      ```
+      lines
+      ```
 
 ``*name* [unit]`` in a cell is a `Symbol`, a column in the middle (``:-:``) holds badges; ``![...](name)`` draws a
-picture or a chart, ``[name]`` sets blocks and ``## [name]`` whole parts that the code hands over.
+picture or a chart, ``[name]`` sets blocks and ``## [name]`` whole parts that the code hands over. A part's key, and
+whether it is folded or an aside, may be left out.
 A name that the template misspells is an error.
 """
 
@@ -38,6 +43,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -58,11 +64,11 @@ _SYMBOL = re.compile(r"\*([^*]+)\*(.*)", re.S)
 _CELL = re.compile(r"(?<!\\)\|")
 _PICTURE = re.compile(r"!\[(.*?)\]\(([\w-]+)\)\s*(.*)", re.S)
 _PLACED = re.compile(r"\[(\w+)\]")
-_PART = re.compile(r"(.*?)(?: \{(\w+)\})?")
+_PART = re.compile(r"(.*?)(?: \{(?:(?!folded|aside)(\w+))? ?(folded|aside)?\})?")
 _STEP = re.compile(r"(.*?)(?: `(.*)`)?", re.S)
 
 Placed = Mapping[str, Sequence[Block | Part]]
-Figures = Mapping[str, Callable[[], Any] | Chart | None]
+Figures = Mapping[str, Callable[[], Any] | tuple[Callable[[], Any], Callable[[], str]] | Chart | None]
 
 
 def chapter_of(
@@ -77,8 +83,8 @@ def chapter_of(
         Its ``__name__``.
     template : str
         Name of the template without its ending; the module's own when empty.
-    figures : mapping of str to callable or Chart, optional
-        Each picture that the template places: what draws it, or a chart.
+    figures : mapping of str to callable, two callables or Chart, optional
+        Each picture that the template places: what draws it, and what answers on a screen; or a chart.
     placed : mapping of str to sequence of Block or Part, optional
         What the template sets by ``[name]`` and ``## [name]``.
     **values
@@ -107,7 +113,7 @@ def chapter_of(
         heading, _, body = section.partition("\n")
         heading = heading.replace(_NOTHING, "")
         if heading.strip() == "Next":
-            steps = tuple(_step(s) for p in _paragraphs(body) for s in _items(p))
+            steps = tuple(map(_step, _listed(body.replace(_NOTHING, ""))))
         elif named := _PLACED.fullmatch(heading.strip()):
             parts += [p for p in (placed or {})[named[1]] if isinstance(p, Part)]
         else:
@@ -163,13 +169,21 @@ def _paragraphs(text: str) -> list[str]:
     return [p for p in paragraphs if p]
 
 
+def _listed(text: str) -> list[str]:
+    """The points of a list, as they stand there."""
+    return [item for item in re.split(r"^- ", text, flags=re.M) if item.strip()]
+
+
 def _items(text: str) -> list[str]:
-    """The points of a list."""
-    return [_line(item) for item in re.split(r"^- ", text, flags=re.M) if item.strip()]
+    """The points of a list, each on a line."""
+    return [_line(item) for item in _listed(text)]
 
 
 def _step(text: str) -> Step:
-    match = _STEP.fullmatch(text)
+    sentence, fence, lines = text.partition("\n  ```\n")
+    if fence:
+        return Step(_line(sentence), textwrap.dedent(lines.rpartition("  ```")[0]).strip().replace(r"\|", "|"))
+    match = _STEP.fullmatch(_line(text))
     assert match is not None  # as anything is a sentence
     return Step(match[1], match[2] or "")
 
@@ -182,7 +196,8 @@ def _part(heading: str, body: str, figures: Figures, placed: Placed) -> Part:
         named = _PLACED.fullmatch(paragraph)
         new = placed[named[1]] if named else (_block(paragraph, figures),)
         content += [b for b in new if not isinstance(b, Part)]
-    return Part(match[1], tuple(content), folded=match[2] == "folded", aside=match[2] == "aside")
+    how = match[3]
+    return Part(match[1], tuple(content), key=match[2] or "", folded=how == "folded", aside=how == "aside")
 
 
 def _block(text: str, figures: Figures) -> Block:
@@ -200,7 +215,8 @@ def _block(text: str, figures: Figures) -> Block:
         assert drawn is not None, f"{name} is placed and not drawn"
         if isinstance(drawn, Chart):
             return drawn.picture(name, caption=caption, description=description)
-        return Picture(name=name, draw=drawn, caption=caption, description=description)
+        draw, answers = drawn if isinstance(drawn, tuple) else (drawn, "")
+        return Picture(name=name, draw=draw, interactive=answers, caption=caption, description=description)
     return _line(text)
 
 

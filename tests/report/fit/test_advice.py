@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.identification import Estimate
-from upright.report.fit.chapter import fit_steps
+from upright.report.fit.advice import fit_steps
 
 
 def said(fit, **more):

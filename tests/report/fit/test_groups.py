@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from upright.identification import Estimate
-from upright.report.fit.chapter import fit_steps
+from upright.report.fit.advice import fit_steps
 from upright.report.fit.tables import run_table, score_table
 
 FACTOR = Estimate(value=1.2, stderr=0.02, interval=(1.16, 1.24), unit="1", status="well determined")

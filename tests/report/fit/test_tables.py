@@ -11,7 +11,9 @@ import pytest
 from upright.identification import Estimate, Parameter, RunScore
 from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Assumption, Judgement, Offer, Pole
-from upright.report.fit.chapter import chapter, fit_steps, headline, motion_part, question, score_pictures
+from upright.report.fit.advice import fit_steps
+from upright.report.fit.chapter import chapter, headline, motion_part
+from upright.report.fit.pictures import score_pictures
 from upright.report.fit.tables import (
     cross_table,
     finding,
@@ -239,10 +241,10 @@ def test_the_headline_says_the_worst_first(changed, what, said):
 
 
 def test_the_question_counts_fitted_and_predicted_runs(changed):
-    said = question(changed(runs={"a": score(), "b": score(), "c": score("predict")}))
+    said = chapter(changed(runs={"a": score(), "b": score(), "c": score("predict")})).question
     assert said.startswith("Which values of J_d, J_p, b_1, b_2, b_1c, b_2c let the equations of motion of 'Furuta'")
     assert said.endswith("follow 2 runs, and does the model then predict 1 more that it has not seen?")
-    assert question(changed(runs={"a": score()})).endswith("follow 1 run?")
+    assert chapter(changed(runs={"a": score()})).question.endswith("follow 1 run?")
 
 
 def part(fit, key, **more):

@@ -11,8 +11,9 @@ from upright.experiments.free_swing_4.figures import drift_figure, energy_figure
 from upright.experiments.free_swing_4.release import TILT
 from upright.experiments.free_swing_4.run import FreeSwing, recovered
 from upright.identification.model.fit import Fit, RunScore
-from upright.report.fit.chapter import motion_part, rest_picture, run_pictures
+from upright.report.fit.chapter import motion_part
 from upright.report.fit.figures import directions_figure, fit_figure, interval_figure
+from upright.report.fit.pictures import rest_picture, run_pictures
 from upright.report.fit.tables import finding, parameter_table, score_table
 from upright.report.page import Chapter, Symbol, simulated
 from upright.report.prose import Placed, chapter_of

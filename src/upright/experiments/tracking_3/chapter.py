@@ -25,7 +25,8 @@ from upright.experiments.tracking_3.run import BEFORE, DWELL, RESERVE, Outcome, 
 from upright.gains.requests import written
 from upright.identification.model.fit import Fit
 from upright.paper.reproduce import TABLE_2
-from upright.report.fit.chapter import motion_part, run_pictures
+from upright.report.fit.chapter import motion_part
+from upright.report.fit.pictures import run_pictures
 from upright.report.fit.tables import finding, parameter_table
 from upright.report.page import Block, Chapter, KeyNumber, Part, Picture
 from upright.report.planes import RootLocus, loci_chart

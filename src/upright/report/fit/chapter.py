@@ -1,29 +1,21 @@
-"""A fit as a chapter: the question, how the runs are followed, which numbers came out and what they are worth."""
+"""A fit as a chapter: the numbers and pictures that its words in `chapter.md` print."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from upright.errors import ImpossiblePhysics
 from upright.identification.inference.assumptions import assumption_sentences
 from upright.identification.ladder.cross_validation import CrossValidation
-from upright.identification.model.fit import Fit, RunScore
-from upright.identification.model.runs import SPREADS
-from upright.physics import Plant
+from upright.identification.model.fit import Fit
+from upright.report.fit.advice import fit_steps
 from upright.report.fit.equations import equations
-from upright.report.fit.figures import (
-    autocorrelation,
-    autocorrelation_figure,
-    correlation_figure,
-    directions_figure,
-    fit_figure,
-    interval_figure,
-    path_figure,
-)
-from upright.report.fit.interactive import path_traces, score_traces, search_path
+from upright.report.fit.figures import correlation_figure, directions_figure, interval_figure, path_figure
+from upright.report.fit.interactive import path_traces, search_path
+from upright.report.fit.pictures import rest_picture, run_pictures
 from upright.report.fit.tables import (
     cross_table,
     finding,
@@ -33,29 +25,13 @@ from upright.report.fit.tables import (
     run_table,
     score_table,
 )
-from upright.report.interactive.traces import ROOM
-from upright.report.page import (
-    Assessment,
-    Block,
-    Chapter,
-    Facts,
-    Formula,
-    KeyNumber,
-    Part,
-    Picture,
-    Points,
-    Step,
-    Symbol,
-    Table,
-)
+from upright.report.page import Assessment, Block, Chapter, Facts, Formula, KeyNumber, Part, Picture, Symbol
 from upright.report.planes import fitted_poles_chart
+from upright.report.prose import chapter_of, templates_of
 from upright.report.rig import rig_drawing
-from upright.report.symbols import percent, plain
 
-_HELD = (
-    "Held speed: what holding the measured speed from the same restarts predicts, without any model. Where it is as "
-    "good as the fit, the horizon tells nothing about the model."
-)
+READABLE = 24
+"""Parameters whose names there is room for beside a matrix."""
 
 
 def chapter(
@@ -81,33 +57,39 @@ def chapter(
     windows : sequence of str
         How much of each log counts, in sentences.
     """
-    used = (Points(tuple(windows)),) if windows else ()
-    pictures = run_pictures(fit, "fit")
-    return Chapter(
-        title=title,
-        verdict=headline(fit),
-        detail=" ".join([*(a.headline for a in fit.answers), *assumption_sentences(fit.assumptions)]) or fit.verdict,
-        sound=fit.trusted,
-        question=question(fit),
+    pictures, ratios, own, poles = run_pictures(fit, "fit"), ratio_table(fit), run_table(fit), pole_table(fit)
+    estimated, assumed = parameter_table(fit), assumption_sentences(fit.assumptions)
+    fitted = sum(s.role == "fit" for s in fit.runs.values())
+    page = chapter_of(
+        __name__, fit=fit, title=title, plant=fit.model.plant.__name__, headline=headline(fit),
+        detail=" ".join([*(a.headline for a in fit.answers), *assumed]) or fit.verdict,
+        fitted=fitted, predicted=len(fit.runs) - fitted, estimated=bool(estimated.rows), assumed=assumed,
+        poles=bool(poles.rows), windows=windows, crossed=crossed,
+        varied=any(e.status != "known" and e.value != 0 for e in fit.estimates.values()),
+        strongest=_strongest(fit), directed=_directed(fit),
+        figures={
+            "fit-poles": fitted_poles_chart(fit.poles) if poles.rows else None,
+            "fit-intervals": lambda: interval_figure(fit.estimates),
+            "fit-correlation": lambda: correlation_figure(fit),
+            "fit-directions": lambda: directions_figure(fit),
+            "fit-search": (lambda: path_figure(*search_path(fit)), lambda: path_traces(fit)),
+        },
+        placed={
+            "parameters": (estimated,), "ratios": (ratios,) if fit.assumptions and ratios.rows else (),
+            "own": (own,) if own.rows else (), "poles": (poles,), "scores": (score_table(fit.runs),),
+            "crossed": () if crossed is None else (cross_table(crossed),), "pictures": pictures,
+            "residuals": rest_picture(fit, "fit"),
+            "motion": (motion_part(fit),), "data": (data_part(provenance or {}),),
+        },
+    )  # fmt: skip
+    return replace(
+        page, sound=fit.trusted, warnings=fit.warnings, drawing=_drawing(fit), best=_best(fit, pictures),
+        findings=tuple(_findings(fit)),
         assessments=tuple(
             Assessment(question=a.question, state=_STATES[a.answer], why=a.headline) for a in fit.answers
         ),
-        drawing=_drawing(fit),
-        best=_best(fit, pictures),
-        findings=tuple(_findings(fit)),
-        parts=(
-            *_parameters(fit),
-            Part(title="Fit of the runs", key="fit", content=(*used, *_scores(fit, crossed), *pictures)),
-            *_verdict(fit),
-            _residuals(fit),
-            _unseen(fit),
-            motion_part(fit),
-            *_search(fit),
-            data_part(provenance or {}),
-        ),
-        warnings=fit.warnings,
-        steps=tuple(fit_steps(fit, study=study, folder=folder, crossed=crossed is not None)),
-    )
+        steps=fit_steps(fit, study=study, folder=folder, crossed=crossed is not None),
+    )  # fmt: skip
 
 
 _STATES = {"yes": "supported", "in part": "in part", "no": "not supported"} | {
@@ -145,41 +127,7 @@ def _findings(fit: Fit) -> Iterator[KeyNumber]:
 
 def headline(fit: Fit) -> str:
     """The verdict in a sentence."""
-    if fit.interrupted:
-        return "Do not rely on this model yet: the search was interrupted, and this is its best so far."
-    if fit.failed:
-        return "The fit failed: the simulated motion grows beyond all bounds, so its numbers mean nothing."
-    if not fit.trusted:
-        return "Do not rely on this model yet."
-    answers = [a.answer for a in fit.answers]
-    loop = answers[-1] if len(answers) > 1 else "yes"
-    if answers[:1] == ["not tested"]:
-        return "Not tested: it explains the runs that it was fitted to, and none was held out."
-    if loop == "yes":
-        return "Rely on this model for prediction and for a loop."
-    driven = {"not tested": "; its drive has not been tested", "no": ", not for a loop", "in part": ""}.get(loop, "")
-    return f"Rely on this model for prediction{driven}."
-
-
-def _verdict(fit: Fit) -> Iterator[Part]:
-    """The answers with what to do and why."""
-    if fit.answers:
-        rows = tuple((a.question, a.answer, a.advice, " ".join(a.reasons)) for a in fit.answers)
-        headings = ("question", "answer", "what to do", "why")
-        table = Table(caption="What the fit is good for", headings=headings, rows=rows, badge=1)
-        yield Part(title="What the verdict rests on", key="verdict", content=(table,), folded=True)
-
-
-def question(fit: Fit) -> str:
-    """The question of a fit, in a sentence."""
-    fitted = sum(s.role == "fit" for s in fit.runs.values())
-    predicted = len(fit.runs) - fitted
-    runs = f"{fitted} run{'s' if fitted != 1 else ''}"
-    estimated = ", ".join(fit.model.estimated) or "no parameter"
-    held = f", and does the model then predict {predicted} more that it has not seen?" if predicted else "?"
-    return (
-        f"Which values of {estimated} let the equations of motion of '{fit.model.plant.__name__}' follow {runs}{held}"
-    )
+    return templates_of(__package__).get_template("headline.md").render(fit=fit).strip()
 
 
 def data_part(provenance: Mapping[str, object]) -> Part:
@@ -222,318 +170,16 @@ def motion_part(fit: Fit) -> Part:
     )
 
 
-def _scores(fit: Fit, crossed: CrossValidation | None) -> list[Block]:
-    blocks: list[Block] = [score_table(fit.runs)] if fit.runs else ["No run was scored."]
-    if any(score.naive for score in fit.runs.values()):
-        blocks.append(_HELD)
-    if crossed is not None:
-        blocks.append(cross_table(crossed))
-        if crossed.interrupted:
-            blocks.append(Points(("Interrupted: runs without a prediction were not reached.",)))
-    return blocks
-
-
-def run_pictures(fit: Fit, prefix: str) -> list[Picture]:
-    """Data against model, run by run, fitted runs first."""
-    return score_pictures(fit.runs, fit.model.plant, prefix)
-
-
-def score_pictures(scores: Mapping[str, RunScore], plant: type[Plant], prefix: str) -> list[Picture]:
-    """Data against model, run by run, fitted runs first, predicted ones with their bands."""
-    pictures: list[Picture] = []
-    runs = sorted(scores.items(), key=lambda item: item[1].role != "fit")
-    signals = sum(len(score.measured) for _, score in runs)
-    buckets = max(100, min(450, 6000 // max(signals, 1)))  # keeps the page below 2 MB whatever the number of runs
-    for i, (label, score) in enumerate(runs):
-        what = "fitted" if score.role == "fit" else "predicted, not fitted"
-        how = "" if score.horizon is None else f", restarted from the measured state every {score.horizon:g} s"
-        how = f", every sample predicted {score.horizon:g} s ahead" if score.ahead else how
-        how += f", scored from {score.score_from:g} s on" if score.score_from > 0 else ""
-        fits = ", ".join(f"{plain(n)} {percent(v)}" for n, v in score.fit_percent.items())
-        title = f"{label} ({what})"
-        pictures.append(
-            Picture(
-                name=f"{prefix}-run{i}",
-                draw=lambda score=score, title=title: fit_figure(score, plant, title=title, buckets=buckets),
-                interactive=lambda score=score, title=title: score_traces(
-                    {"model": score}, plant, name=title, room=ROOM // len(runs)
-                ),
-                caption=f"Run '{label}', {what}{how}. Wide light line: measured; thin line: model; "
-                f"below each, their difference.{_banded(score)}",
-                description=f"Measured and modelled signals over {score.t[-1] - score.t[0]:.3g} s; fit {fits}.",
-            )
-        )
-    return pictures
-
-
-def _banded(score: RunScore) -> str:
-    if not score.band:
-        return ""
-    inside = ", ".join(f"{plain(n)} {percent(v)}" for n, v in score.inside.items())
-    return f" Grey: the band that should hold 90 % of the samples; inside are {inside}."
-
-
-def _parameters(fit: Fit) -> list[Part]:
-    table = parameter_table(fit)
-    parts = [
-        Part(title="Parameters", key="parameters", content=(table if table.rows else "No parameter was estimated.",))
-    ]
-    ratios, own, poles = ratio_table(fit), run_table(fit), pole_table(fit)
-    if fit.assumptions:
-        content = (Points(tuple(assumption_sentences(fit.assumptions))), *((ratios,) if ratios.rows else ()))
-        parts.append(Part(title="What rests on assumed numbers", key="assumed", content=content))
-    if own.rows:
-        parts.append(Part(title="Runs and groups", key="runs", content=(own,), folded=True))
-    if poles.rows:
-        about = (
-            "Of the linear model at each equilibrium, viscous friction and back-EMF included, dry friction not; what "
-            "the runs held is held."
-        )
-        drawn = fitted_poles_chart(fit.poles).picture(
-            "fit-poles",
-            caption="Poles in the upper half of the s-plane, with bars for the 95 % intervals of real and imaginary "
-            "part. Tinted: unstable.",
-            description="The same poles as in the table below.",
-        )
-        parts.append(Part(title="Poles of the fitted rig", key="poles", content=(about, drawn, poles), folded=True))
-    return parts
-
-
-def _residuals(fit: Fit) -> Part:
-    shown: tuple[Block, ...] = tuple(rest_picture(fit, "fit")) or ("There is no run to look at.",)
-    return Part(title="Residuals", key="residuals", content=shown, folded=True)
-
-
-def rest_picture(fit: Fit, prefix: str) -> list[Picture]:
-    """Autocorrelation of the residuals of all runs, or nothing when there is no run."""
-    if not fit.runs:
-        return []
-    return [
-        Picture(
-            name=f"{prefix}-rest",
-            draw=lambda: autocorrelation_figure(fit.runs),
-            caption="Autocorrelation of the residuals. White noise would stay inside the grey band 95 % of the "
-            "time; slow waves outside it are motion that the model does not explain.",
-            description="One panel per run and signal; correlation from −1 to 1 against lag in seconds.",
-        )
-    ]
-
-
-def _unseen(fit: Fit) -> Part:
-    """What the data cannot see, with intervals, correlations and directions as far as the fit states them."""
-    blocks: list[Block] = [
-        Points(fit.unseen) if fit.unseen else "No combination of the estimated parameters is invisible in these runs."
-    ]
-    if any(e.status != "known" and e.value != 0 for e in fit.estimates.values()):
-        blocks.append(
-            Picture(
-                name="fit-intervals",
-                draw=lambda: interval_figure(fit.estimates),
-                caption="Interval of every estimate relative to its value. Solid with a disk: well determined. Dashed "
-                "with a square: anything else, such as poorly determined or at a bound; an arrow leaves the picture.",
-                description="The same intervals as in the table above.",
-            )
-        )
+def _strongest(fit: Fit) -> tuple[float, str, str] | None:
+    """The strongest correlation and its pair, where there is a matrix that can be read."""
     n = len(fit.names)
-    if 1 < n <= 24 and fit.correlation.shape == (n, n):
-        blocks.append(
-            Picture(
-                name="fit-correlation",
-                draw=lambda: correlation_figure(fit),
-                caption="Correlation of the estimates. Close to ±1 (bold): the data fix a combination of the two "
-                "better than either.",
-                description=_strongest(fit),
-            )
-        )
-    if n and n <= 24 and fit.singular_values.size and fit.directions.shape == (fit.singular_values.size, n):
-        blocks.append(
-            Picture(
-                name="fit-directions",
-                draw=lambda: directions_figure(fit),
-                caption="Singular values of the scaled Jacobian, each with its combination of relative changes in the "
-                "parameters. What stands near or left of the dotted line, the data cannot see.",
-                description="; ".join(fit.unseen) or "No combination of the parameters is unseen.",
-            )
-        )
-    return Part(title="What the data cannot see", key="unseen", content=tuple(blocks), folded=True)
-
-
-def _strongest(fit: Fit) -> str:
+    if not 1 < n <= READABLE or fit.correlation.shape != (n, n):
+        return None
     off = np.nan_to_num(np.abs(fit.correlation - np.diag(np.diag(fit.correlation))))
     i, j = np.unravel_index(int(np.argmax(off)), off.shape)
-    return f"The strongest correlation is {fit.correlation[i, j]:.3f}, between {fit.names[i]} and {fit.names[j]}."
+    return fit.correlation[i, j], fit.names[i], fit.names[j]
 
 
-def _search(fit: Fit) -> list[Part]:
-    """How the numbers were found."""
-    how = f"{fit.method}; {fit.evaluations} evaluations in {fit.seconds:.3g} s; final cost {fit.cost:.6g}."
-    content: tuple[Block, ...] = (Points((how,)), *_path_picture(fit))
-    parts = [Part(title="How the numbers were found", key="how", content=content, folded=True)]
-    if fit.history:
-        stages = tuple((stage, f"{cost:.6g}", str(evaluations)) for stage, cost, evaluations in fit.history)
-        table = Table(
-            caption="What each stage came to", headings=("stage", "cost", "evaluations"), rows=stages, numbers=(1, 2)
-        )
-        parts.append(Part(title="Stages of the search", key="stages", content=(table,), aside=True))
-    return parts
-
-
-def _path_picture(fit: Fit) -> list[Picture]:
-    if len(fit.path) < 3:
-        return []
-    return [
-        Picture(
-            name="fit-search",
-            draw=lambda: path_figure(*search_path(fit)),
-            interactive=lambda: path_traces(fit),
-            caption="How the search went: the mean squared residual over the horizon of each stage (1 is how the "
-            "signals vary), and every parameter relative to its estimate, after each accepted step. The cost rises "
-            "where the horizon grows or another start is tried.",
-            description=f"{len(fit.path)} accepted steps; the mean squared residual ends at {fit.path[-1][0]:.3g}.",
-        )
-    ]
-
-
-FOLLOWED = 80.0
-"""Fit percent below which a free run counts as lost."""
-
-
-def fit_steps(fit: Fit, *, study: str = "STUDY.toml", folder: str = "OUT", crossed: bool = False) -> Iterator[Step]:
-    """Steps in order of weight: what would make the model wrong first, what would make it better last.
-
-    `crossed` says that every run was predicted by the others already.
-    """
-    if fit.failed:
-        yield Step(
-            "Nothing else is known before the simulated motion stays finite: check the plant and the signs and "
-            "units of drive and sensors, and fit from measured states, a short time ahead.",
-            '[[runs]]\nhorizon = "0.5 s"',
-        )
-        return
-    loop = fit.answers[-1] if fit.answers else None
-    if loop and fit.trusted and loop.answer == "not tested" and loop.advice:
-        yield Step(loop.advice)
-    yield from (*_broken(fit), *_blind(fit), *_nuisances(fit), *_friction(fit, study, folder), *_stopped(fit))
-    untested = "Every run was fitted, so nothing tests the model yet; "
-    if not (crossed or fit.interrupted) and all(s.role == "fit" for s in fit.runs.values()):
-        if len(fit.runs) > 1:
-            each = f"upright identify {study} -o {folder} --hold-out each"
-            yield Step(f"{untested}predict each from a fit of the others.", each)
-        else:
-            yield Step(f"{untested}keep one run or one tail back.", '[[runs]]\nlabel = "tail"\nrole = "predict"')
-    yield Step(
-        "See whether the model predicts a run it has not met: name that run in a study of its own.",
-        f"upright predict {folder}/fit.json OTHER.toml",
-    )
-
-
-def _broken(fit: Fit) -> Iterator[Step]:
-    if fit.interrupted:
-        yield Step("The search was stopped; these are its best values so far. Run it to its end.")
-    for name in dict.fromkeys(n for s in fit.runs.values() for n in s.fit_percent):
-        missed = {label: s.fit_percent[name] for label, s in fit.runs.items() if s.fit_percent.get(name, 0.0) < 0}
-        if missed:
-            runs = ", ".join(f"'{label}' {percent(value)}" for label, value in missed.items())
-            yield Step(f"{plain(name)} is explained worse than by its mean ({runs}){_so_far_off(missed.values())}",
-                       f"[sensors.{name}]\nsign = -1")  # fmt: skip
-    lost = [
-        label
-        for label, s in fit.runs.items()
-        if s.role == "fit" and s.horizon is None and any(v < FOLLOWED for v in s.fit_percent.values())
-    ]
-    if lost:
-        yield Step(
-            f"The simulation of run {', '.join(map(repr, lost))} loses the measurement. If the figure shows that it "
-            "followed at first, end the window there, or restart it from measured states.",
-            '[[runs]]\nhorizon = "0.5 s"',
-        )
-
-
-REVERSED = (-160.0, -40.0)
-"""Fit percents about -100: of a signal that is the measured one with the other sign, somewhat off."""
-
-
-def _so_far_off(missed: Collection[float]) -> str:
-    """What may be wrong with a signal that is explained worse than by its mean."""
-    if all(REVERSED[0] < value < REVERSED[1] for value in missed):
-        return ", as by a reversed sign. Where the study says sign = -1 already, take that out."
-    return ": look at the plant and at the units of its columns first, then at the sign."
-
-
-def _stopped(fit: Fit) -> Iterator[Step]:
-    stopped = [n for n, e in fit.estimates.items() if e.status == "at bound"]
-    none = [n for n in stopped if fit.estimates[n].value == 0]
-    if none:
-        yield Step(f"These runs need no {', '.join(none)}: the estimate ended at zero; leave it out.")
-    for name in stopped:
-        if name not in none:
-            yield Step(f"{name} stopped at its bound; widen the bound or give its value as known.")
-
-
-def _blind(fit: Fit) -> Iterator[Step]:
-    yield from map(Step, fit.unseen)
-    weak = [n for n, e in fit.estimates.items() if e.status in ("poorly determined", "unseen")]
-    if weak and not fit.unseen:
-        yield Step(
-            f"The data hardly see {', '.join(weak)}: measure one of them on the bench and give it as known, or add a "
-            "run that moves it more.",
-            f'{weak[0]} = {{ value = "…", uncertainty = "…" }}',
-        )
-
-
-def _nuisances(fit: Fit) -> Iterator[Step]:
-    """What differs from run to run: useless factors, and predictions that chose their own."""
-    homes = {f"group {group}": own for group, own in fit.groups.items()} | dict(fit.per_run)
-    idle = [f"{n} of {home}" for home, own in homes.items() for n, e in own.items() if e.status == "unseen"]
-    if idle:
-        yield Step(f"The runs say nothing about {', '.join(idle)}: leave it out of unknown or shared.")
-    for label, score in fit.runs.items():
-        chosen = [n for n in score.adapted if n.partition(".")[0] in SPREADS]
-        if chosen and score.role != "fit":
-            yield Step(
-                f"The prediction of run '{label}' chose its own {' and '.join(chosen)}, so it proves less; let the run "
-                "share that with runs that are fitted.",
-                f'[[runs]]\nlabel = "{label}"\nshared = {{ {chosen[0]} = "that day" }}',
-            )
-            break  # one example is enough
-    for label, score in fit.runs.items():
-        if score.offer is not None:
-            own = ", ".join(f'"{n}"' for n in dict.fromkeys([*score.adapted, score.offer.name]))
-            yield Step(
-                score.offer.sentence(label, score.fit_percent), f'[[runs]]\nlabel = "{label}"\nunknown = [{own}]'
-            )
-
-
-def _friction(fit: Fit, study: str, folder: str) -> Iterator[Step]:
-    """Autocorrelated residuals: is there a friction term that was left out?"""
-    coloured: list[str] = []
-    for label, score in fit.runs.items():
-        for j, name in enumerate(score.measured):
-            rest = score.y[:, j] - score.simulated[:, j]
-            rest = rest[np.isfinite(rest)]
-            lags = max(1, rest.size // 10)
-            if rest.size < 20 or score.role != "fit":
-                continue
-            r = autocorrelation(rest, lags)[1:]
-            if np.mean(np.abs(r) > 1.96 / math.sqrt(rest.size)) > 0.3:
-                coloured.append(f"{plain(name)} of '{label}'")
-    fixed = {
-        name: f"{term} of {joint.on} ({name})"
-        for joint in fit.model.plant.joints
-        for term, name in (("Coulomb friction", joint.coulomb), ("quadratic drag", joint.quadratic))
-        if name and name not in fit.model.estimated and joint.on not in _prescribed(fit)
-    }
-    if coloured and fixed:
-        others = " and others" if coloured[3:] else ""
-        yield Step(
-            f"What is left over is not noise ({', '.join(coloured[:3])}{others}). Not estimated so far: "
-            f"{'; '.join(fixed.values())}. Give them guesses; the ladder keeps those with which held-out data are "
-            "predicted better.",
-            f'[parameters]\n{next(iter(fixed))} = {{ guess = "…", min = 0 }}\n\nupright ladder {study} -o {folder}',
-        )
-
-
-def _prescribed(fit: Fit) -> set[str]:
-    """Coordinates whose motion every fitted run was given: whatever rubs there, these logs do not show it."""
-    fitted = [s for s in fit.runs.values() if s.role == "fit"]
-    return set[str]().union(*(s.measured for s in fitted)) - {n for s in fitted for n in s.fit_percent}
+def _directed(fit: Fit) -> bool:
+    n, rank = len(fit.names), fit.singular_values.size
+    return 0 < n <= READABLE and rank > 0 and fit.directions.shape == (rank, n)

@@ -80,7 +80,7 @@ def predict(
     from upright.files import write_json
     from upright.identification.inference.promise import promise
     from upright.identification.inference.scoring import predict as score
-    from upright.report.fit.chapter import score_pictures
+    from upright.report.fit.pictures import score_pictures
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part, Step
     from upright.verbs.handover import called, fitted_of
