@@ -16,6 +16,7 @@ import numpy as np
 from upright.readers.labelled import Label, bare_rows, without_arrival
 from upright.readers.reader import READERS, Reader
 from upright.readers.resolution import epoch_digits, exact_seconds, is_epoch, is_index, rebuild
+from upright.readers.responses import is_frequency, response_columns
 from upright.readers.source import Source, TextTable
 from upright.readers.stamps import in_seconds
 from upright.records import Array, Record
@@ -217,6 +218,12 @@ def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
         if seconds := time_scale(name):
             return j, seconds
     first = table[:, 0]
+    if text.named and (is_frequency(text.names[0]) or response_columns(text.names)):
+        raise text.source.bad(
+            f"expected a time column named 't' or 'time', got the frequencies '{text.names[0]}': this is a frequency"
+            f" response and no log; `upright frequency` reads it",
+            line=text.first_line - 1,
+        )
     if text.named and is_index(text.names[0], first):
         raise text.source.bad(
             f"expected a time column named 't' or 'time', got only the sample index '{text.names[0]}';"

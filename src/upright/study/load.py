@@ -101,6 +101,7 @@ class Study:
 def load_study(
     path: PathLike, *, data: PathLike | None = None, fixed: Mapping[str, float] | None = None,
     text: str | None = None, records: Mapping[str, Record] | None = None, plant: type[Plant] | None = None,
+    runs: bool = True,
 ) -> Study:  # fmt: skip
     """Rig and runs that a study file describes.
 
@@ -118,6 +119,8 @@ def load_study(
         Logs that are read already.
     plant : type of Plant, optional
         In the place of the one that the study names.
+    runs : bool
+        False for the rig alone: no log is read.
 
     Raises
     ------
@@ -132,9 +135,9 @@ def load_study(
     rig = read_rig(study, plant, drive_unit(study), fixed)
     folder = Path(data) if data is not None else path.parent
     logs = {(name, "", "", ""): record for name, record in (records or {}).items()}
-    runs = read_runs(study, plant, lambda run: _log(run, folder, logs))
+    read = read_runs(study, plant, lambda run: _log(run, folder, logs)) if runs else ()
     hardware = read_hardware(study, plant, rig, [log.provenance.rig or "" for log in logs.values()])
-    rig = with_noise(rig, runs)
+    rig = with_noise(rig, read)
     if fixed is not None:
         levels = {n: p for n, p in rig.parameters.items() if n.startswith(NOISE)}
         known = {n: replace(p, value=fixed.get(n, p.value), estimate=False) for n, p in levels.items()}
@@ -143,7 +146,7 @@ def load_study(
         path=path,
         plant=study.section("rig").text_of("plant", "furuta"),
         model=rig,
-        runs=runs,
+        runs=read,
         title=study.text_of("title", "My rig") if "title" in study else "",
         source=study.text_of("source", "https://...") if "source" in study else "",
         ladder=read_ladder(study, plant),

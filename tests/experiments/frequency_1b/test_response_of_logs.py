@@ -128,3 +128,58 @@ def test_logs_of_different_periods_are_refused(tmp_path):
 @pytest.mark.parametrize(("column", "step"), [([0.0, 0.5, 2.0, 0.5], 0.5), ([3.0, 3.0, 3.0], 0.0), ([1.0, -1.0], 2.0)])
 def test_the_smallest_step_of_a_column_is_its_resolution_and_one_that_never_moves_has_none(column, step):
     assert _step(np.array(column)) == step
+
+
+STUDY = """
+[rig]
+plant = "torsional-1"
+[parameters]
+J_1 = {{ value = "0.0025 kg m^2", uncertainty = "1 %" }}
+k_1 = {{ guess = "1 N m/rad" }}
+c_1 = {{ guess = "0.01 N m s/rad" }}
+{more}
+[actuator]
+gain = {{ guess = "0.3 N m/V" }}
+"""
+
+
+def analyser(folder, more=""):
+    """A disk on a spring as an analyser has it, 2 % of noise; and a study of it without a log."""
+    rng = np.random.default_rng(3)
+    f = np.geomspace(0.5, 20, 80)
+    s = 2j * math.pi * f
+    h = 0.1 / (0.0025 * s * s + 0.004 * s + 2.5) * np.exp(0.02 * (rng.normal(size=80) + 1j * rng.normal(size=80)))
+    rows = np.column_stack([f, 20 * np.log10(np.abs(h)), np.degrees(np.unwrap(np.angle(h)))])
+    np.savetxt(folder / "a.csv", rows, delimiter=",", header="Frequency (Hz),Magnitude (dB),Phase (deg)", comments="")
+    (folder / "study.toml").write_text(STUDY.format(more=more), encoding="utf-8")
+    return folder / "a.csv", request(make=str(folder / "study.toml"))
+
+
+def test_an_analysers_table_and_a_study_without_a_log_give_the_rig(tmp_path):
+    table, asked_for = analyser(tmp_path)
+    result = response_of_logs([table], asked_for, tmp_path / "out")
+    fit = result.answer.fit
+    assert fit.trusted
+    assert result.response.outputs == ("theta_1",)
+    for name, true in (("k_1", 2.5), ("c_1", 0.004), ("actuator.gain", 0.1)):
+        low, high = fit.estimates[name].interval
+        assert low <= true <= high
+        assert (high - low) / true < 0.2
+    again = response_of_logs([result.response], asked_for, tmp_path / "again").answer.fit
+    assert again.estimates["k_1"].value == pytest.approx(fit.estimates["k_1"].value, rel=1e-9)
+
+
+def test_dry_friction_that_a_table_cannot_show_is_not_sought_and_the_fit_not_trusted(tmp_path):
+    table, asked_for = analyser(tmp_path, 'f_1c = { guess = "0.01 N m" }')
+    fit = response_of_logs([table], asked_for, tmp_path / "out").answer.fit
+    assert not fit.trusted
+    assert "dry friction (f_1c) was not sought" in fit.verdict
+    assert "f_1c" not in fit.estimates
+
+
+def test_a_table_of_a_rig_with_several_coordinates_has_to_say_whose_response_it_is(tmp_path):
+    table, _ = analyser(tmp_path)
+    with pytest.raises(BadInput, match=r"'y' is no coordinate of .*--signal theta_2=COLUMN"):
+        response_of_logs([table], request(make="torsional"), tmp_path / "out")
+    with pytest.raises(BadInput, match="stands alone"):
+        response_of_logs([table, response_of_logs([table], request(), tmp_path / "b").response], request(), tmp_path)

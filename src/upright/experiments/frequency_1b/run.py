@@ -21,13 +21,18 @@ from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_si
 from upright.experiments.stand.known import Known, bench, model_of
 from upright.identification import GreyBox
 from upright.identification.frequency.answer import FrequencyFit, explain
+from upright.identification.frequency.fitting import nonlinear_friction
 from upright.identification.frequency.response import FrequencyResponse, is_response
 from upright.identification.frequency.spectra import response_of
+from upright.identification.frequency.table import is_table, response_of_table
+from upright.identification.model.fit import Fit
+from upright.physics import Plant
 from upright.progress import Progress, silent
 from upright.records import Record
 from upright.rig import Rig
 from upright.rig.hardware import Hardware
 from upright.rig.makes import Make, hardware_of_make, make_named, make_of, make_rig
+from upright.study.load import load_study
 from upright.study.results import write_response_fit
 
 
@@ -121,7 +126,8 @@ class LogRequest:
     Attributes
     ----------
     make : str, optional
-        Whose design gives plant and guesses; None for a response without a fit, or when a study says it.
+        Whose design gives plant and guesses, or a study whose rig does, its runs aside; None for a response without a
+        fit, or when the study of the logs says it.
     command : str, optional
         Column of the command; the log's own when omitted.
     signals : mapping of str to str
@@ -162,13 +168,14 @@ class LoggedResponse:
 
 
 def response_of_logs(
-    sources: Sequence[Path], request: LogRequest, folder: Path, *, data: Path | None = None, tell: Progress = silent
-) -> LoggedResponse:
+    sources: Sequence[Path | FrequencyResponse], request: LogRequest, folder: Path, *, data: Path | None = None,
+    tell: Progress = silent,
+) -> LoggedResponse:  # fmt: skip
     """Response of the sources, fitted when plant and numbers are named; writes `frequency.csv` and `fit.json`.
 
     Parameters
     ----------
-    sources : sequence of Path
+    sources : sequence of Path or FrequencyResponse
         One study, one response, or logs that repeat one another.
     data : Path, optional
         Folder of a study's logs.
@@ -177,28 +184,88 @@ def response_of_logs(
     """
     rest: GreyBox | None = None
     plant, hardware = "", Hardware()
-    if len(sources) == 1 and sources[0].suffix == ".toml":
-        rest, plant, records, resolution, hardware = _study(sources[0], data)
+    first, files = sources[0], [s for s in sources if isinstance(s, Path)]
+    if len(files) < len(sources) > 1:
+        raise BadInput("A frequency response stands alone: hand over one, or the logs that it would come from.")
+    if isinstance(first, FrequencyResponse):
+        response = _between(first, request.band)
+    elif len(files) == 1 and first.suffix == ".toml":
+        rest, plant, records, resolution, hardware = _study(first, data)
         response = response_of(records, command="u", outputs=records[0].outputs, kind=request.kind, hold=request.hold,
                                resolution=resolution, band=request.band)  # fmt: skip
-    elif len(sources) == 1 and is_response(sources[0]):
-        response = FrequencyResponse.from_csv(sources[0])
-        if request.band is not None:
-            response = response.only((response.omega >= request.band[0]) & (response.omega <= request.band[1]))
+    elif len(files) == 1 and is_response(first):
+        response = _between(FrequencyResponse.from_csv(first), request.band)
+    elif len(files) == 1 and is_table(first):
+        response = _between(_table(first, request), request.band)
     else:
-        response = _logs(sources, request)
-    if request.make and rest is None:
+        response = _logs(files, request)
+    if request.make and rest is None and request.make.endswith(".toml"):
+        study = load_study(request.make, runs=False)
+        rest, plant, hardware = study.model, study.plant, study.hardware
+    elif request.make and rest is None:
         make = make_named(request.make)
         rest, plant, hardware = _designed(request, make), make.plant_name, Hardware(vendor=make.vendor)
     folder.mkdir(parents=True, exist_ok=True)
-    names = tuple(s.name for s in sources)
+    names = tuple(s.name for s in files) or ("a response",)
     if rest is None:
         response.to_csv(folder / "frequency.csv")
         return LoggedResponse(sources=names, response=response, answer=None, folder=folder)
     at = next(iter(rest.plant.equilibria))
-    answer = explain(rest, at, response, seed=request.seed, tell=tell)
+    response = _of_coordinates(response, rest.plant)
+    unsized = () if response.drive.all() else _dry_friction(rest)
+    answer = explain(_without(unsized, rest), at, response, seed=request.seed, tell=tell)
+    if unsized:
+        answer = replace(answer, fit=_unsized(answer.fit, unsized))
     write_response_fit(answer, folder, plant, "Frequency response", ", ".join(names), hardware)
     return LoggedResponse(sources=names, response=response, answer=answer, folder=folder)
+
+
+def _between(response: FrequencyResponse, band: tuple[float, float] | None) -> FrequencyResponse:
+    low, high = band or (0.0, np.inf)
+    return response.only((response.omega >= low) & (response.omega <= high))
+
+
+def _table(path: Path, request: LogRequest) -> FrequencyResponse:
+    """Response of somebody else's table, in rad or m where it is in counts."""
+    response = response_of_table(path, request.signals)
+    counts = np.array([request.counts.get(n, 1.0) for n in response.outputs])
+    return replace(
+        response, response=response.response / counts, variance=response.variance / counts**2, hold=request.hold or 0.0
+    )
+
+
+def _of_coordinates(response: FrequencyResponse, plant: type[Plant]) -> FrequencyResponse:
+    """The response, its output named for the coordinate of a plant that has but one."""
+    names = [c.name for c in plant.coordinates]
+    if len(names) == len(response.outputs) == 1:
+        return replace(response, outputs=tuple(names))
+    for name in response.outputs:
+        if name not in names:
+            raise BadInput(
+                f"'{name}' is no coordinate of {plant.__name__} ({', '.join(names)}); say whose response it is: "
+                f"--signal {names[-1]}=COLUMN."
+            )
+    return response
+
+
+def _dry_friction(rig: GreyBox) -> tuple[str, ...]:
+    """Friction that is sought and that a response shows only beside the size of the motion."""
+    nonlinear = nonlinear_friction(rig.plant)
+    return tuple(n for n, p in rig.parameters.items() if n in nonlinear and p.estimate)
+
+
+def _without(names: Sequence[str], rig: GreyBox) -> GreyBox:
+    left = {n: replace(rig.parameters[n], value=0.0, estimate=False) for n in names}
+    return replace(rig, parameters={**rig.parameters, **left})
+
+
+def _unsized(fit: Fit, names: Sequence[str]) -> Fit:
+    """The fit with the reservation that dry friction passed for viscous friction in it."""
+    reservation = (
+        f"Not to be relied on: the size of the command is not stated, so dry friction ({', '.join(names)}) was not "
+        "sought and passes for viscous friction; leave it out of the study if the rig has none."
+    )
+    return replace(fit, verdict=f"{reservation} {fit.verdict}", trusted=False)
 
 
 def _designed(request: LogRequest, make: Make) -> GreyBox:
@@ -218,8 +285,6 @@ def _designed(request: LogRequest, make: Make) -> GreyBox:
 
 
 def _study(path: Path, data: Path | None) -> tuple[GreyBox, str, list[Record], list[float], Hardware]:
-    from upright.study.load import load_study
-
     study = load_study(path, data=data)
     runs = [r for r in study.runs if r.role == "fit"]
     if not runs or any(r.measured != runs[0].measured for r in runs):

@@ -71,8 +71,9 @@ class Balance:
 
     @cached_property
     def whole(self) -> bool:
-        """Whether every coordinate was measured, so that amplitudes can be considered."""
-        return not self.linear and len(set(self.columns)) == len(self.plant.coordinates)
+        """Whether every coordinate was measured, and how far it moved, so that amplitudes can be considered."""
+        known = self.data.drive.all() and len(set(self.columns)) == len(self.plant.coordinates)
+        return bool(known) and not self.linear
 
     @cached_property
     def _motion(self) -> tuple[Any, Any, Any, Any]:
@@ -128,6 +129,8 @@ class Balance:
         factors = direction[self.columns]
         if np.count_nonzero(factors) == 1 and factors.max() == 1.0:
             return self.data.dry[:, int(np.argmax(factors))]
+        if not self.data.drive.all():
+            return np.zeros(self.data.omega.size, dtype=np.complex128)
         amplitude = (self.data.response * self.data.drive[:, None]) @ factors  # overtones of a combination are not kept
         return describing(self.data.omega, np.abs(amplitude)[:, None])[:, 0]
 

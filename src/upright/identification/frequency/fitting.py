@@ -20,6 +20,7 @@ from upright.errors import BadInput, NotIdentifiable
 from upright.identification.frequency.balance import Balance
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.model.grey_box import GreyBox, Parameter
+from upright.physics import Plant
 from upright.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -139,7 +140,7 @@ def coordinates(rig: GreyBox, *, magnitude: bool = False) -> Coordinates:
     BadInput
         When nothing is sought, or a guess is no size.
     """
-    dry = {n for j in rig.plant.joints for n in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding)}
+    dry = nonlinear_friction(rig.plant)
     chosen: list[tuple[Parameter, bool]] = []
     base = {n: p.value for n, p in rig.parameters.items()}
     for name, p in rig.parameters.items():
@@ -162,6 +163,11 @@ def coordinates(rig: GreyBox, *, magnitude: bool = False) -> Coordinates:
         tolerance=np.array([p.uncertainty / p.value if p.uncertainty > 0 else math.inf for p, _ in chosen]),
         base=base,
     )
+
+
+def nonlinear_friction(plant: type[Plant]) -> set[str]:
+    """Parameters of the friction that a linear model has none of."""
+    return {n for j in plant.joints for n in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding) if n}
 
 
 def usable(data: FrequencyResponse, *, dry: bool = True) -> tuple[NDArray[np.bool_], tuple[str, ...]]:

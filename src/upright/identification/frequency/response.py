@@ -30,6 +30,8 @@ def _none_complex() -> Complex:
 
 
 MARK = "# upright frequency response"
+NORMAL = 0.6745
+"""Median of the size of a normal variable of deviation 1."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,7 +57,7 @@ class FrequencyResponse:
     distortion : (F, n) array
         Root of the power at harmonics over that at the frequency itself; 0 where nobody says.
     drive : (F,) complex array
-        Command at this frequency, its peak and phase.
+        Command at this frequency, its peak and phase; 0 where nobody says, and the motion counts as small then.
     dry : (F, n) complex array
         Viscous friction to which one unit of Coulomb friction of that coordinate came in this motion [s/rad or s/m]:
         ``4/(pi V)`` for a sine of speed V (describing function); 0 where it is left out.
@@ -108,7 +110,7 @@ class FrequencyResponse:
         for name, default in (("variance", 0.0), ("coherence", 1.0), ("distortion", 0.0), ("dry", 0.0), ("still", 0.0)):
             kind = np.complex128 if name == "dry" else np.float64
             self._fill(name, response.shape, kind, default)
-        self._fill("drive", omega.shape, np.complex128, 1.0)
+        self._fill("drive", omega.shape, np.complex128, 0.0)
         heard = np.array(self.overtones, dtype=np.complex128)
         heard = heard if heard.ndim == 3 else np.zeros((*response.shape, 0), dtype=np.complex128)
         if heard.shape[:2] != response.shape:
@@ -141,6 +143,13 @@ class FrequencyResponse:
         names = ("omega", "response", "variance", "coherence", "distortion", "drive", "dry", "still", "overtones")
         return replace(self, **{n: getattr(self, n)[at] for n in names})
 
+    def with_scatter(self) -> FrequencyResponse:
+        """The same, where nobody stated errors, with those by which neighbouring frequencies scatter."""
+        scatter = np.array([_scatter(self.omega, column) for column in self.response.T])
+        shares = ", ".join(f"{100 * s:.2g} %" for s in scatter)
+        note = f"No errors are stated; they are taken from how neighbouring frequencies scatter, {shares}."
+        return replace(self, variance=2 * (scatter * np.abs(self.response)) ** 2, notes=(*self.notes, note))
+
     def to_control(self) -> Any:
         """`control.FrequencyResponseData` with named signals; variances and what else was measured stay behind."""
         import control
@@ -158,7 +167,7 @@ class FrequencyResponse:
         return FrequencyResponse(
             omega=np.asarray(data.omega), response=values[:, 0, :].T, outputs=tuple(map(str, data.output_labels)),
             input=str(data.input_labels[0]),
-        )  # fmt: skip
+        ).with_scatter()  # fmt: skip
 
     def to_csv(self, path: PathLike) -> None:
         """Write text that `from_csv` reads back bit for bit."""
@@ -215,6 +224,20 @@ class FrequencyResponse:
             if isinstance(error, BadInput):
                 raise
             raise BadInput(f"'{path}' must be a frequency response written by upright, but: {error}.") from None
+
+
+def _scatter(omega: Array, response: Complex) -> float:
+    """Relative error of real and of imaginary part, by how far each point lies off the line through its neighbours.
+
+    The median keeps out resonances, where the response itself bends.
+    """
+    if omega.size < 5:
+        return 0.0
+    x = np.log(omega)
+    y = np.column_stack([np.log(np.abs(response)), np.unwrap(np.angle(response))])
+    share = ((x[1:-1] - x[:-2]) / (x[2:] - x[:-2]))[:, None]
+    off = y[1:-1] - (1 - share) * y[:-2] - share * y[2:]
+    return float(np.median(np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2))) / NORMAL
 
 
 def _parts(values: Complex) -> list[Array]:

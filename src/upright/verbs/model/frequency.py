@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from upright.errors import BadInput
 from upright.files import keeps_its_inputs
@@ -20,6 +20,7 @@ from upright.verbs.values import pairs, path_of, paths, si
 if TYPE_CHECKING:
     from upright.experiments.frequency_1b.run import FrequencyRun, LoggedResponse
     from upright.files import PathLike
+    from upright.identification.frequency.response import FrequencyResponse
 
 KINDS = ("sines", "multisine", "sweep")
 
@@ -77,13 +78,14 @@ class ResponseOptions(TypedDict, total=False):
 
     upright frequency --rig furuta --seed 3 -o out
     upright frequency sweep.csv --rig linear --known "m_p=135 g +- 0.2 %" -o out
+    upright frequency analyser.csv --rig my-study.toml -o out
     upright frequency one.txt two.txt --command v --signal theta=theta
     """,
 )  # fmt: skip
 @written_where_named
 @keeps_its_inputs
 def frequency(
-    sources: Sequence[PathLike] | PathLike | None = None, *, rig: str | None = None,
+    sources: Sequence[PathLike] | PathLike | FrequencyResponse | None = None, *, rig: PathLike | None = None,
     seed: int = 0, ask: str = "sines", data: PathLike | None = None,
     out: PathLike | None = None, pdf: bool = False, progress: Progress = silent,
     **of_log: Unpack[ResponseOptions],
@@ -95,10 +97,10 @@ def frequency(
 
     Parameters
     ----------
-    sources : path or sequence of paths, optional
-        Logs (repeats together), a frequency.csv, or a study; a twin when omitted.
-    rig : str
-        Twin, or rig model of the logged rig: furuta, linear, rectilinear, torsional.
+    sources : path, sequence of paths, FrequencyResponse or control.FrequencyResponseData, optional
+        Logs (repeats together), a table of a response (frequency, magnitude, phase), or a study; a twin when omitted.
+    rig : str or path
+        Twin, or rig model of the logged rig: furuta, linear, rectilinear, torsional, or a STUDY.toml whose rig it is.
     seed : int
         Random seed of the rig model; 0 is nominal.
     ask : str
@@ -133,16 +135,16 @@ def frequency(
             raise BadInput(f"{option} is one of {', '.join(KINDS)}, got '{value}'.")
     limits = _band(options.get("low"), options.get("high"))
     files = [at / "frequency.csv"]
-    if logs := [path_of(source, "a log") for source in paths(sources)]:
+    if logs := [_source(source) for source in paths(sources)]:
         from upright.experiments.frequency_1b.chapter import log_chapter
         from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
         from upright.verbs.values import si_if_given
 
         request = LogRequest(
-            make=rig or None, command=options.get("command") or None, signals=pairs(options.get("signal"), "--signal"),
+            make=str(rig) if rig else None, command=options.get("command") or None, signals=pairs(options.get("signal"), "--signal"),
             kind=kind or None, seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
             counts={n: _count(n, v) for n, v in pairs(options.get("counts"), "--counts").items()},
-            known={n: _known(n, v, rig or "") for n, v in pairs(options.get("known"), "--known").items()},
+            known={n: _known(n, v, str(rig or "")) for n, v in pairs(options.get("known"), "--known").items()},
         )  # fmt: skip
         result = response_of_logs(logs, request, at, data=None if data is None else Path(data))
         files += [at / "fit.json"] if result.answer else []
@@ -161,13 +163,22 @@ def frequency(
         from upright.report.page import simulated
         from upright.rig.makes import make_named
 
-        make_named(rig)
-        result = run_frequency(rig, seed, at, progress, kind=ask)
+        make_named(str(rig))
+        result = run_frequency(str(rig), seed, at, progress, kind=ask)
         files += [at / "sweep.csv", at / "fit.json"]
         page = simulated(chapter(result))
     files += write_page(page, at / "report.html", pdf)
     numbers = {"verdict": page.verdict, "sound": page.sound, **page.numbers, "files": [str(f) for f in files]}
     return Answer(result, replace(page, numbers=numbers), files)
+
+
+def _source(source: Any) -> Path | FrequencyResponse:
+    """A file, or a response that is in memory."""
+    from upright.identification.frequency.response import FrequencyResponse
+
+    if hasattr(source, "frdata"):
+        return FrequencyResponse.from_control(source)
+    return source if isinstance(source, FrequencyResponse) else path_of(source, "a log")
 
 
 def _band(low: float | None, high: float | None) -> tuple[float, float] | None:
