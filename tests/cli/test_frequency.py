@@ -50,7 +50,7 @@ def test_a_twin_is_swept_and_its_log_tells_the_same(tmp_path, monkeypatch):
         (["--known", "m_p=1 kg"], "belongs to a log"),
         (["u.csv", "--command", "v"], "no column 'v'"),
         (["u.csv", "--command", "u", "--counts", "phi=3"], "which is no output"),
-        (["u.csv", "--command", "u", "--rig", "linear"], "no coordinate 'y'"),
+        (["u.csv", "--command", "u", "--rig", "linear"], "'y' is no coordinate of"),
         (["u.csv", "--command", "u", "--known", "m_p=1 kg"], "name the rig with --rig"),
         (["u.csv", "--command", "u", "--rig", "linear", "--known", "m_q=1"], "no number 'm_q'"),
         (["u.csv", "--command", "u", "--counts", "y=none"], "not 0"),

@@ -141,8 +141,9 @@ def frequency(
         from upright.verbs.values import si_if_given
 
         request = LogRequest(
-            make=str(rig) if rig else None, command=options.get("command") or None, signals=pairs(options.get("signal"), "--signal"),
-            kind=kind or None, seed=seed, hold=si_if_given(options.get("hold"), "s"), band=limits,
+            make=str(rig) if rig else None, command=options.get("command") or None,
+            signals=pairs(options.get("signal"), "--signal"), kind=kind or None, seed=seed,
+            hold=si_if_given(options.get("hold"), "s"), band=limits,
             counts={n: _count(n, v) for n, v in pairs(options.get("counts"), "--counts").items()},
             known={n: _known(n, v, str(rig or "")) for n, v in pairs(options.get("known"), "--known").items()},
         )  # fmt: skip
