@@ -54,6 +54,38 @@ def test_a_host_that_sleeps_for_half_a_second_after_a_minute_has_not_slowed_the_
     assert seen == {1.0}
 
 
+@pytest.mark.parametrize(("after", "asleep"), [(0.6, 0.06), (10.0, 0.4)])
+def test_a_sample_that_its_host_took_after_a_sleep_is_no_slow_tick(after, asleep):
+    """It was in time; the host was not, and the board's own watchdog tells it with the next sample."""
+    ticking, last = TickLength(), round(after / 1e-3)
+    assert {ticking.sees(k * 1e-3, k * 1e-3 + asleep * (k == last)) for k in range(last + 2_000)} == {1.0}
+
+
+@pytest.mark.parametrize("watchdog", [0.0, 0.02, 0.05, 0.5])
+def test_whatever_a_watchdog_lets_pass_is_no_slow_tick(watchdog):
+    """The first sample late by all of it and the others not, or the other way round; two clocks 2 % apart."""
+    late = max(JITTER, watchdog)
+    for first, others in ((late, 0.0), (0.0, late)):
+        ticking = TickLength(watchdog)
+        times = [k * 4e-3 for k in range(2_500)]
+        assert {ticking.sees(t, 1.02 * t + (others if t else first)) for t in times} == {1.0}
+
+
+def test_who_names_a_host_that_slept_is_its_board_s_watchdog():
+    """The host sleeps for 60 ms with a sound sample in hand; the rig's limit is 20 ms."""
+    scene = Scene().started()
+    began = scene.rig.sample.time
+
+    def clock():
+        if scene.rig.sample.time - began > 0.6 and not scene.rig.sample.faults:
+            scene.rig.alone(0.06)
+        return scene.rig.sample.time
+
+    scene.beside.clock = clock
+    with pytest.raises(RigStopped, match="no command came within the watchdog's time"):
+        scene.run(1.0)
+
+
 def test_a_run_on_a_board_with_a_slow_tick_is_stopped_with_its_length():
     scene = Scene().started()
     scene.beside.clock = lambda: 2.0 * scene.rig.sample.time

@@ -245,7 +245,7 @@ class Supervisor:
         self._braking = Braking(model, self.duty.at, self.held.command, falls=falls) if model else None
         self._passed = deque(maxlen=1 + SPAN)
         self._last, self._first, self._command, self._stale = None, None, 0.0, 0
-        self._ticking = TickLength()
+        self._ticking = TickLength(self.held.watchdog)
         self.event(self._time, "start", f"{mode.name} holds {', '.join(f'{t:.4g}' for t in self.target)}")
 
     def _arm(self) -> None:
