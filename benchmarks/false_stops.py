@@ -12,6 +12,11 @@ stopped before the pendulum fell by 29 degrees, where the limit on lean stops a 
 those of stopped and fallen in which the likeliest cause was the right one; *after* is the time from the fault, median
 and nine tenths; *body* how far what carries the pendulum was from the middle by then, in the median. Faults that the
 loop bears, and that nobody moves, are seen when somebody taps it next.
+
+The length of the board's tick is compared with the host's clock in all that while, and that sees nothing of a rig but
+the times of its samples: hours of these are drawn by themselves (`benchmarks/hazards/clocks.py`), as a host takes them
+that other programs keep busy. A host that pauses for longer than the watchdog is stopped by the board: *by the board*
+counts that, and is no false stop. Then a tick changes after 5 s; *after* is the time to the stop, *told* its length.
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.hazards.clocks import BOARDS, watched
 from benchmarks.hazards.parallel import Twins
 from benchmarks.hazards.sound import MAKES, Breaking, Lane, Played
 from benchmarks.measure import Line, Target, page
@@ -30,6 +36,8 @@ from upright.rig.makes import make_rig
 
 LANES, SECONDS, FIRST = 30, 600.0, 6001
 BROKEN, BROKEN_FIRST, AFTER, WATCHED = 12, 1001, 5.0, 25.0
+TICKS = (0.5, 0.9, 1.1, 2.0)
+"""Lengths of a board's tick that is wrong, over what it should be."""
 
 
 def _shown(channel: int, factor: float, twins: Twins, t: float) -> None:
@@ -88,6 +96,9 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         Line(contender="false stops in 10 hours", ratio=(10 * stops / max(hours, 10),) * 3, target=Target(most=1.0),
              note=f"{stops} in {hours:.2f} h of play")
     )  # fmt: skip
+    progress("the board's clock beside the host's")
+    of_clocks, line = clocks(range(FIRST, FIRST + (2 if quick else LANES)), 30.0 if quick else SECONDS)
+    lines.append(line)
     all_of = faults()
     for make in MAKES:
         body += ["", f"## Something broken: {make_rig(make).name}", "", *HEAD]
@@ -97,9 +108,35 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             row, line = judged(make, what, word, lanes)
             body.append(row)
             lines.append(line)
+    body += of_clocks
     if markdown:
         markdown.write_text(page("false_stops", "False stops", __doc__, body), encoding="utf-8")
     return lines
+
+
+def clocks(seeds: range, seconds: float) -> tuple[list[str], Line]:
+    """The watch of the tick's length over hours of sound clocks and over wrong ticks, and its line of the benchmark."""
+    body = ["", "## The board's clock beside the host's", "", "| clock | hours | false stops | by the board |",
+            "|---|--:|--:|--:|"]  # fmt: skip
+    stops, hours = 0, 0.0
+    for board in BOARDS:
+        runs = [watched(board, seed, seconds) for seed in seeds]
+        stopped, run_for = sum(len(run.stopped) for run in runs), sum(run.hours for run in runs)
+        stops, hours = stops + stopped, hours + run_for
+        body.append(f"| {board} | {run_for:.2f} | {stopped} | {sum(run.ended for run in runs)} |")
+    body += ["", "| tick | stopped | after | told |", "|---|--:|--:|--:|"]
+    for tick in TICKS:
+        runs = [watched(board, s, WATCHED, tick, AFTER) for s in range(BROKEN_FIRST, BROKEN_FIRST + BROKEN // 2)
+                for board in BOARDS]  # fmt: skip
+        first = np.array([run.stopped[0] for run in runs if run.stopped]).reshape(-1, 2)
+        after = f"{np.median(first[:, 0]) - AFTER:.2f} s, {np.quantile(first[:, 0], 0.9) - AFTER:.2f}"
+        told = f"{first[:, 1].min():.2f} to {first[:, 1].max():.2f}"
+        body.append(f"| {tick:g} times as long | {len(first)} of {len(runs)} | {after} | {told} |")
+    note = f"{stops} in {hours:.2f} h of samples"
+    return body, Line(
+        contender="false stops of the tick's length", ratio=(10 * stops / max(hours, 10),) * 3,
+        target=Target(most=1.0), note=note,
+    )  # fmt: skip
 
 
 HEAD = ("| fault | loops | fell | stopped | named | after | body |", "|---|--:|--:|--:|--:|--:|--:|")
