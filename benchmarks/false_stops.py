@@ -16,7 +16,8 @@ loop bears, and that nobody moves, are seen when somebody taps it next.
 The length of the board's tick is compared with the host's clock in all that while, and that sees nothing of a rig but
 the times of its samples: hours of these are drawn by themselves (`benchmarks/hazards/clocks.py`), as a host takes them
 that other programs keep busy. A host that pauses for longer than the watchdog is stopped by the board: *by the board*
-counts that, and is no false stop. Then a tick changes after 5 s; *after* is the time to the stop, *told* its length.
+counts that, and is no false stop. Then a tick changes after 5 s; *after* is the time to the stop, and *measured* its
+length: its mean since the start, or lately where that shows it first.
 """
 
 from __future__ import annotations
@@ -124,14 +125,14 @@ def clocks(seeds: range, seconds: float) -> tuple[list[str], Line]:
         stopped, run_for = sum(len(run.stopped) for run in runs), sum(run.hours for run in runs)
         stops, hours = stops + stopped, hours + run_for
         body.append(f"| {board} | {run_for:.2f} | {stopped} | {sum(run.ended for run in runs)} |")
-    body += ["", "| tick | stopped | after | told |", "|---|--:|--:|--:|"]
+    body += ["", "| tick | stopped | after | measured |", "|---|--:|--:|--:|"]
     for tick in TICKS:
         runs = [watched(board, s, WATCHED, tick, AFTER) for s in range(BROKEN_FIRST, BROKEN_FIRST + BROKEN // 2)
                 for board in BOARDS]  # fmt: skip
         first = np.array([run.stopped[0] for run in runs if run.stopped]).reshape(-1, 2)
         after = f"{np.median(first[:, 0]) - AFTER:.2f} s, {np.quantile(first[:, 0], 0.9) - AFTER:.2f}"
-        told = f"{first[:, 1].min():.2f} to {first[:, 1].max():.2f}"
-        body.append(f"| {tick:g} times as long | {len(first)} of {len(runs)} | {after} | {told} |")
+        measured = f"{first[:, 1].min():.2f} to {first[:, 1].max():.2f}"
+        body.append(f"| {tick:g} times as long | {len(first)} of {len(runs)} | {after} | {measured} |")
     note = f"{stops} in {hours:.2f} h of samples"
     return body, Line(
         contender="false stops of the tick's length", ratio=(10 * stops / max(hours, 10),) * 3,
