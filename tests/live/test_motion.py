@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import hashlib
+import html
 import json
 import math
 import re
@@ -14,6 +16,7 @@ import pytest
 
 import upright as up
 from tests.live.browser import WIDTHS, opened, until
+from upright.basis import SIMULATED
 from upright.identification import RunScore
 from upright.live.motion import MOST, RATE, _strip, motion_page
 from upright.live.page import still
@@ -137,12 +140,104 @@ def test_a_picture_shows_the_record_at_its_time_and_what_nobody_measured_as_the_
         np.testing.assert_allclose(numbers_of(shown), values, atol=24 / 2**16)
     assert [(c["name"], c["unit"]) for c in (psi, theta)] == [("psi", "rad"), ("theta", "rad")]
     assert "Read this." in text
-    bare = motion_page(ARM, t, {"theta": 2 * t}, {}, name="run")
-    psi, theta = json.loads(re.search(r"const RUN = (\{.*?\});\n", bare)[1])["coordinates"]
-    assert not numbers_of(psi["simulated"]).any()
-    assert theta["measured"] == theta["simulated"]
     brief = motion_page(ARM, np.array([0.0, 1e-3]), {}, {"theta": np.zeros(2)}, name="run")
     assert json.loads(re.search(r"const RUN = (\{.*?\});\n", brief)[1])["frames"] == 2
+
+
+def sixtieths(seconds=2.0, **columns):
+    """A record with a sample for every picture of its page."""
+    t = np.linspace(0.0, seconds, round(60 * seconds) + 1)
+    units = {n: "m" if n == "x" else "rad" for n in columns}
+    return up.Record(t=t, signals={n: f(t) for n, f in columns.items()}, units=units)
+
+
+SWUNG = {"psi": lambda t: 0.4 * np.sin(2 * t), "theta": lambda t: np.cos(7 * t) * np.exp(-0.2 * t)}
+
+
+def motion_in(page):
+    """Word and angles of every coordinate that a page plays, by its name."""
+    data = json.loads(re.search(r"const RUN = (\{.*?\});\n", page)[1])
+    kinds = ("measured", "simulated")
+    return {c["name"]: {k: numbers_of(c[k]) for k in kinds if c[k] is not None} for c in data["coordinates"]}
+
+
+def test_a_record_is_played_at_its_own_angles_and_called_measured(tmp_path):
+    """A picture at every sample, so nothing is interpolated: half a 16-bit level of the range is lost."""
+    record = sixtieths(**SWUNG)
+    played = record.play(ARM, out=tmp_path / "run.html")
+    shown = motion_in(played.page)
+    assert [*shown] == ["psi", "theta"]
+    for name, words in shown.items():
+        assert [*words] == ["measured"]
+        np.testing.assert_allclose(words["measured"], record[name], atol=np.ptp(record[name]) / 2**16)
+    assert "simulated motion" not in played.page
+    assert "SIMULATED" not in played.page + repr(played)
+    assert (tmp_path / "run.html").read_text(encoding="utf-8") == played.page
+    policy = html.unescape(re.search(r'Content-Security-Policy" content="([^"]*)"', played.page)[1])
+    body = re.search(r'<script id="script">(.*)</script>', played.page, re.DOTALL)[1]
+    digest = base64.b64encode(hashlib.sha256(body.encode()).digest()).decode()
+    alone = f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'sha256-"  # and nothing is fetched
+    assert policy.startswith(alone)
+
+
+def test_degrees_of_a_log_are_drawn_as_the_same_angles():
+    record = sixtieths(**SWUNG)
+    degrees = record.replace(signals={n: np.degrees(record[n]) for n in record}, units={"psi": "deg", "theta": "deg"})
+    for name, words in motion_in(degrees.play(ARM).page).items():
+        np.testing.assert_allclose(words["measured"], record[name], atol=np.ptp(record[name]) / 2**15)
+
+
+def test_what_was_simulated_is_played_by_the_plant_that_moved_and_says_so():
+    """A rod let go at 0.1 rad is back after 2 pi sqrt(J/(m g l)) = 2 pi sqrt(4 l/3 g), l half its length."""
+    rod = up.Pendulum(m_p=0.2, l_cg=0.15, J_p=0.2 * 0.15**2 / 3)
+    period = 2 * math.pi * math.sqrt(4 * 0.15 / (3 * rod.g)) * (1 + 0.1**2 / 16)
+    run = up.simulate(rod, start={"theta": 0.1}, seconds=period, dt=period / 500)
+    played = run.play()
+    assert [*motion_in(played.page)["theta"]] == ["simulated"]
+    assert motion_in(played.page)["theta"]["simulated"][[0, -1]] == pytest.approx(0.1, abs=1e-4)
+    assert played.chapter.first_line == SIMULATED
+    assert SIMULATED in played.page
+    assert "simulated motion" in played.page
+    assert run.window(0.1, 0.3).play().value.t[0] == pytest.approx(0.1, abs=period / 500)  # a part knows its plant
+
+
+def test_a_coordinate_that_no_column_has_is_named_and_drawn_at_zero_without_a_trace():
+    page = sixtieths(theta=np.sin).play(ARM).page
+    assert motion_in(page)["psi"] == {}
+    assert "Not in the record, drawn at zero: psi." in page
+    assert page.count('<svg class="strip"') == 1
+    assert 'id="value-1"' in page
+
+
+@pytest.mark.parametrize(
+    ("record", "rig", "words"),
+    [
+        (sixtieths(**SWUNG), None, r"play needs what moved, with its numbers: run\.play\(rig\)"),
+        (sixtieths(roll=np.sin), ARM, "columns called psi, theta, and the record has roll; rename them"),
+        (sixtieths(**SWUNG), 3, "got int"),
+        (sixtieths(**SWUNG).replace(units={"theta": "V"}), ARM, "draws theta in rad, and its column is in V"),
+        (sixtieths(**SWUNG).replace(units={"theta": "counts"}), ARM, "its column is in counts; convert it first"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_played_is_a_sentence(record, rig, words):
+    with pytest.raises(up.BadInput, match=words):
+        record.play(rig)
+
+
+@pytest.mark.slow
+def test_a_run_that_was_only_measured_moves_alone(tmp_path):
+    record = sixtieths(**SWUNG)
+    record.play(ARM, out=tmp_path / "run.html")
+    with opened(tmp_path / "run.html") as (page, wrong):
+        until(page, "window.motion !== undefined")
+        assert page.locator("#rig g").count() == 1
+        for k in (0, 60, 120):
+            page.locator("#scrub").fill(str(k))
+            for i, name in enumerate(SWUNG):
+                text = page.inner_text(f"#value-{i}").replace("\u2212", "-")
+                assert re.fullmatch(r"measured -?[\d.]+°", text)
+                assert float(text[9:-1]) == pytest.approx(math.degrees(record[name][k]), abs=0.06)
+        assert wrong == []
 
 
 def test_a_strip_is_the_record_with_a_tenth_of_room_and_the_model_within_it():

@@ -1,12 +1,14 @@
-// Plays a run: measured and simulated rig over each other, at the time that a person chooses. Expects RUN, OUTLINE and the mark-up of motion.html.
+// Plays a run: the rig as measured, as simulated, or both over each other, at the time that a person chooses. Expects RUN, OUTLINE and the mark-up of motion.html.
 "use strict";
 
 (() => {
   const $ = (id) => document.getElementById(id), DEG = 180 / Math.PI, names = RUN.coordinates.map((c) => c.name);
   const unpack = ({ middle, scale, levels }) =>
     Float64Array.from(new Int16Array(Uint8Array.from(atob(levels), (c) => c.charCodeAt(0)).buffer), (k) => middle + scale * k);
-  const simulated = RUN.coordinates.map((c) => unpack(c.simulated));
-  const measured = RUN.coordinates.map((c, i) => (c.measured ? unpack(c.measured) : simulated[i]));
+  const nothing = new Float64Array(RUN.frames), one = (packed) => (packed ? unpack(packed) : nothing);
+  const simulated = RUN.coordinates.map((c) => one(c.simulated ?? c.measured));
+  const measured = RUN.coordinates.map((c) => one(c.measured ?? c.simulated));
+  const both = ["measured", "simulated"].every((kind) => RUN.coordinates.some((c) => c[kind]));
   const frames = RUN.frames, seconds = (frames - 1) * RUN.step;
   const at = (columns, k) => columns.map((c) => c[k]);
   const few = Array.from({ length: 60 }, (_, i) => Math.floor((i * (frames - 1)) / 59));
@@ -14,13 +16,13 @@
   const drawing = $("rig");
   drawing.setAttribute("viewBox", view.box.join(" "));
   drawing.replaceChildren();
-  const ghost = new RigDrawing(drawing, OUTLINE, names, view, true), rig = new RigDrawing(drawing, OUTLINE, names, view);
+  const ghost = both && new RigDrawing(drawing, OUTLINE, names, view, true), rig = new RigDrawing(drawing, OUTLINE, names, view);
   const shown = (x, unit) => (unit === "rad" ? `${(x * DEG).toFixed(1)}°` : `${(x * 100).toFixed(2)} cm`).replace("-", "\u2212");
   const state = { time: 0, playing: false, speed: 1, before: 0 };
 
   const show = () => {
     const k = Math.min(frames - 1, Math.round(state.time / RUN.step));
-    ghost.draw(at(measured, k));
+    if (both) ghost.draw(at(measured, k));
     rig.draw(at(simulated, k));
     $("time").textContent = `${(RUN.start + k * RUN.step).toFixed(2)} s`;
     $("scrub").value = k;
@@ -30,8 +32,8 @@
       line.setAttribute("x2", (1000 * k) / (frames - 1));
     }
     RUN.coordinates.forEach((c, i) => {
-      const values = [c.measured && `measured ${shown(measured[i][k], c.unit)}`, `simulated ${shown(simulated[i][k], c.unit)}`];
-      $(`value-${i}`).textContent = values.filter(Boolean).join(", ");
+      const values = [["measured", measured], ["simulated", simulated]].filter(([kind]) => c[kind]);
+      if (values.length) $(`value-${i}`).textContent = values.map(([kind, of]) => `${kind} ${shown(of[i][k], c.unit)}`).join(", ");
     });
     window.motion.frame = k;
   };

@@ -1,4 +1,4 @@
-"""The page in which a run is played: measured and simulated rig over each other, at the time that a person chooses."""
+"""The page in which a run is played: the rig as measured, as simulated, or both, at the time that a person chooses."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ def motion_page(
     simulated: Mapping[str, Array],
     *,
     name: str,
+    performed: str = "",
     remark: str = "",
 ) -> str:
     """The page of a run.
@@ -40,9 +41,11 @@ def motion_page(
     t : array, shape (N,)
         Times [s].
     measured, simulated : mapping of str to array, shape (N,)
-        Motion by coordinate [rad or m]; what was simulated alone is drawn so, what neither has stands at zero.
+        Motion by coordinate [rad or m]; where one is empty, the other is drawn alone; what neither has stands at zero.
     name : str
         Of the run.
+    performed : str
+        `basis.SIMULATED` or `basis.REPLAYED` where no rig was driven.
     remark : str
         What else a reader must know.
 
@@ -60,38 +63,42 @@ def motion_page(
     first, seconds = float(t[0]), float(t[-1] - t[0])
     frames = int(min(MOST, max(2, seconds * RATE + 1)))
     grid = first + np.linspace(0, seconds, frames)
-    columns: list[tuple[Array | None, Array]] = []
-    for c in coordinates:
-        if c.name not in simulated and c.name not in measured:
-            columns.append((None, np.zeros(frames)))
-            continue
-        shown = [np.interp(grid, t, of[c.name]) if c.name in of else None for of in (measured, simulated)]
-        columns.append((shown[0], shown[1] if shown[1] is not None else np.interp(grid, t, measured[c.name])))
-    if not all(np.isfinite(s).all() for _, s in columns):
+    columns = [
+        tuple(np.interp(grid, t, of[c.name]) if c.name in of else None for of in (measured, simulated))
+        for c in coordinates
+    ]
+    if not all(np.isfinite(s).all() for _, s in columns if s is not None):
         raise BadInput(f"the simulated motion of {name} grows beyond all bounds, so it cannot be shown.")
     data = {
         "frames": frames, "step": seconds / (frames - 1), "start": first,
         "coordinates": [
-            {"name": c.name, "unit": c.unit, "measured": None if m is None else packed(m), "simulated": packed(s)}
-            for c, (m, s) in zip(coordinates, columns, strict=True)
+            {"name": c.name, "unit": c.unit}
+            | {of: None if x is None else packed(x) for of, x in zip(("measured", "simulated"), both, strict=True)}
+            for c, both in zip(coordinates, columns, strict=True)
         ],
     }  # fmt: skip
     style = page_source("play.css")
     run = f"const RUN = {in_script(data)};\nconst OUTLINE = {outline};"
     script = "\n".join([page_source("drawing.js"), run, page_source("motion.js")])
-    view, picture = still(plant, [float(s[0]) for _, s in columns])
+    first_shown = [next((float(x[0]) for x in reversed(both) if x is not None), 0.0) for both in columns]
+    view, picture = still(plant, first_shown)
+    kinds = [kind for kind, of in (("measured", measured), ("simulated", simulated)) if of]
+    what = "measured (pale, wide) and simulated" if len(kinds) == 2 else kinds[0]
     return rendered(
         "upright.live", "motion.html",
         policy=f"default-src 'none'; script-src {source_hash(script)}; style-src {source_hash(style)}",
         style=Markup(style), script=Markup(script), picture=Markup(picture), view=view, name=name, frames=frames,
+        what=what, performed=performed,
         strips=[_strip(c.name, c.unit, m, s) for c, (m, s) in zip(coordinates, columns, strict=True)],
         drawn="Drawn to scale from the plant's numbers, rods as if uniform.", remark=remark,
     )  # fmt: skip
 
 
-def _strip(name: str, unit: str, measured: Array | None, simulated: Array) -> dict[str, str]:
-    """Lines of one coordinate over time, in a box of 1000 by 100."""
+def _strip(name: str, unit: str, measured: Array | None, simulated: Array | None) -> dict[str, str]:
+    """Lines of one coordinate over time, in a box of 1000 by 100; empty where there are none."""
     base = simulated if measured is None else measured
+    if base is None:
+        return {}
     low, high = float(base.min()), float(base.max())
     room = 0.1 * (high - low) or 1e-3
     low, high = low - room, high + room

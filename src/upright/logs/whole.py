@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,7 @@ from upright.logs.container import MAGIC, Container, Damaged, Message, summary_f
 from upright.logs.header import LogColumn, LogHeader
 from upright.logs.layout import EVENTS, SAMPLES, columns_of_schema
 from upright.records import Provenance, Record
+from upright.records.record import SIMULATED_NOTE
 
 Columns = dict[str, NDArray[Any]]
 
@@ -82,6 +84,8 @@ class RunLog:
         if not finite.all():
             notes.append(f"{int((~finite).sum())} rows left out that hold a number which is none, such as infinity.")
             t, signals = t[finite], {name: x[finite] for name, x in signals.items()}
+        if re.search(r'^\s*kind\s*=\s*["\']twin["\']', self.header.rig, re.MULTILINE):
+            notes.append(SIMULATED_NOTE)
         if self.dropped:
             notes.append(f"{self.dropped} rows of the loop were dropped while it ran.")
         if t.size < 2:

@@ -34,6 +34,7 @@ LARGEST = 1e30
 SHORTEST = 1e-12  # s; a step of time below that is none: its inverse overflows, and no clock has it
 CSV_MARK = "# upright record"
 _FORMS = ("control", "csv", "mat", "pandas", "parquet", "xarray")
+SIMULATED_NOTE = "This log was simulated; no rig was touched."
 KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
 
@@ -52,6 +53,11 @@ class Provenance:
     window: tuple[float, float] | None = None
     notes: tuple[str, ...] = ()
 
+    @property
+    def simulated(self) -> bool:
+        """Whether no rig moved."""
+        return SIMULATED_NOTE in self.notes
+
     def note(self, *sentences: str) -> Provenance:
         """Same provenance with sentences added."""
         return replace(self, notes=(*self.notes, *sentences))
@@ -59,11 +65,7 @@ class Provenance:
 
 def of_twin(rig: str, seed: int) -> Provenance:
     """Provenance of a simulated log, which says so wherever it goes."""
-    return Provenance(
-        reader="twin",
-        rig=f"digital twin of {rig}, seed {seed}",
-        notes=("This log was simulated; no rig was touched.",),
-    )
+    return Provenance(reader="twin", rig=f"digital twin of {rig}, seed {seed}", notes=(SIMULATED_NOTE,))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -82,6 +84,8 @@ class Record(Shown):
     inputs, outputs : tuple of str, optional
         Names of the signals that drive and that are measured; empty while unknown.
     provenance : Provenance, optional
+    plant : Plant, optional
+        What moved, with its numbers, where it is in memory; no file keeps it.
 
     Raises
     ------
@@ -95,6 +99,7 @@ class Record(Shown):
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     provenance: Provenance = field(default_factory=Provenance)
+    plant: Any = None
 
     def __post_init__(self) -> None:
         t = _column("time", self.t)
@@ -139,8 +144,8 @@ class Record(Shown):
     def __dir__(self) -> list[str]:
         forms = [f"{way}_{form}" for way in ("from", "to") for form in _FORMS]
         return [
-            "animate", "inputs", "names", "outputs", "period", "plot", "provenance", "replace", "signals", "t", "u",
-            "units", "window", "y", *forms,
+            "animate", "inputs", "names", "outputs", "period", "plant", "play", "plot", "provenance", "replace",
+            "signals", "t", "u", "units", "window", "y", *forms,
         ]  # fmt: skip
 
     def __len__(self) -> int:
@@ -209,6 +214,23 @@ class Record(Shown):
     def animate(self, *, plant: Any = None, speed: float = 1.0, frames: int = 25) -> Any:
         """Moving drawing of a rig whose coordinates are columns; see `upright.views.animation.animate`."""
         return views().animate(self, plant=plant, speed=speed, frames=frames)
+
+    def play(self, rig: Any = None, *, out: PathLike | None = None) -> Any:
+        """The rig as it moved, drawn to scale in a page with play, pause and a slider of time.
+
+        Parameters
+        ----------
+        rig : Plant, Rig, fit or path, optional
+            What moved; the plant that `simulate` moved when omitted.
+        out : path, optional
+            Where the page is written, a file ending in .html; nowhere when omitted, and a notebook shows it.
+
+        Raises
+        ------
+        BadInput
+            When the plant is not known or has no drawing, or no column is one of its coordinates.
+        """
+        return views().play(self, rig, out)
 
     def replace(self, **changes: Any) -> Record:
         """Record with some fields changed, checked again."""

@@ -127,7 +127,7 @@ def simulate(
         t=t, signals=signals | commands,
         units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
         inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
-        provenance=simulated_origin(type(plant).__name__),
+        provenance=simulated_origin(type(plant).__name__), plant=plant,
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from upright.realtime.session import RunState
     from upright.running.doctor import Checkup
     from upright.running.run import RigRun
+    from upright.verbs.control.moving import PlayedRun
 
 
 @command(
@@ -54,7 +55,7 @@ def run(
     duration: float = 30.0, check: bool = True, watch: bool = True,
     out: PathLike | None = None, pdf: bool = False,
     observe: Callable[[RunState], str] = lambda _: "", **on: Unpack[RunOptions],
-) -> Answer[RigRun]:  # fmt: skip
+) -> RunAnswer:  # fmt: skip
     """Run a law or a signal on a rig, supervised and logged, and evaluate the run.
 
     The encoders are zeroed while the rig hangs, a small pulse is compared with the model, then you move it to where it
@@ -87,8 +88,8 @@ def run(
 
     Returns
     -------
-    Answer
-        Of a `RigRun`: how it ended, its log, deviations.
+    RunAnswer
+        Of a `RigRun`: how it ended, its log, deviations; `play` shows the rig as it moved.
 
     Raises
     ------
@@ -116,7 +117,26 @@ def run(
     result = run_rig(request, folder, watch=observe)
     written = run_chapter(result)
     page = write_page(written, result.log_path.with_suffix(".html"), pdf)
-    return Answer(result, written, [*([result.log_path] if result.log is not None else []), *page])
+    return RunAnswer(result, written, [*([result.log_path] if result.log is not None else []), *page])
+
+
+class RunAnswer(Answer["RigRun"]):
+    """A run of a rig."""
+
+    def play(self, *, out: PathLike | None = None) -> PlayedRun:
+        """The rig as its encoders saw it, in a page with a slider of time; written where `out` names one.
+
+        Raises
+        ------
+        BadInput
+            When no loop began, or the plant has no drawing.
+        """
+        from upright.verbs.control.moving import played_log
+
+        run: RigRun = self.value
+        if run.log is None:
+            raise BadInput(f"there is nothing to play, since no loop began: {self.chapter.verdict}")
+        return played_log(run.log.record(), run.model.plant, run.log_path.stem, run.file.performed, out)
 
 
 TAP = 3.0

@@ -167,6 +167,13 @@ def animate(record: Record, *, plant: Any, speed: float, frames: int) -> Any:
     return drawn(record, plant=plant, speed=speed, frames=frames)
 
 
+def play(record: Record, rig: Any, out: Any) -> Any:
+    """A page in which the rig moves as it did; see `Record.play`."""
+    from upright.verbs.control.moving import played_record
+
+    return played_record(record, rig, out)
+
+
 @styled
 def draw_record(record: Record, *names: str, buckets: int = 800) -> Any:
     """One panel per column over time; without names the measured ones and what drives, as far as they are known."""

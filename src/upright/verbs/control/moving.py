@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from upright.basis import NOT_SUPPORTED, Basis
 from upright.errors import BadInput, UprightError
 from upright.verbs.answer import Answer
+from upright.verbs.handover import rig_of
 from upright.verbs.options import TrialOptions, known_options, rig_entries
 from upright.verbs.values import Start, read_pole_list, read_start
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from upright.files import PathLike
     from upright.identification.model.fit import RunScore
     from upright.physics import Plant
-    from upright.records import Array
+    from upright.records import Array, Record
     from upright.report.page import Chapter, Part
     from upright.rig import Rig
 
@@ -35,9 +36,7 @@ def played(
     from upright.report.page import Chapter, Step, resting_on
     from upright.rig.completion import completed, doubts
 
-    path = None if out is None else Path(out)
-    if path is not None and path.suffix != ".html":
-        raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
+    path = _page_path(out)
     on = known_options(TrialOptions, options, "play")
     seconds, draws = on.get("seconds", 3.0), on.get("draws", 200)
     if not 0 < seconds <= 20:
@@ -70,12 +69,12 @@ def played(
     return Played(scored, resting_on(chapter, known.basis, SIMULATED), files, text)
 
 
-class Played(Answer["Scores | RunScore"]):
+class Played(Answer["Scores | RunScore | Record"]):
     """What becomes of the rigs, or of a run, and the page in which it moves; a notebook shows the page."""
 
     height = 1180
 
-    def __init__(self, value: Scores | RunScore, chapter: Chapter, files: Sequence[Path], page: str) -> None:
+    def __init__(self, value: Scores | RunScore | Record, chapter: Chapter, files: Sequence[Path], page: str) -> None:
         super().__init__(value, chapter, files)
         self.page = page
 
@@ -100,9 +99,7 @@ def played_run(
     from upright.report.page import Chapter
     from upright.report.symbols import percent
 
-    path = None if out is None else Path(out)
-    if path is not None and path.suffix != ".html":
-        raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
+    path = _page_path(out)
     text = run_page(score, plant, label)
     explained = ", ".join(f"{n} {percent(v)}" for n, v in score.fit_percent.items())
     chapter = Chapter(
@@ -125,6 +122,72 @@ def run_page(score: RunScore, plant: Plant, label: str) -> str:
     missing = [c.name for c in plant.coordinates if c.name not in measured]
     still = f"Not measured, drawn at zero: {', '.join(missing)}." if missing else ""
     return motion_page(plant, score.t[order], measured, simulated, name=label, remark=f"{ahead}{still}")
+
+
+def played_record(record: Record, source: Any = None, out: PathLike | None = None) -> PlayedRun:
+    """A record in a page that plays it, drawn by the plant that a source tells of, its own where that is None."""
+    from upright.basis import SIMULATED
+
+    if source is None and record.plant is None:
+        raise BadInput("play needs what moved, with its numbers: run.play(rig), where rig is a plant, a rig or a fit.")
+    plant = record.plant if source is None else rig_of(source, "play", draws=0).plant
+    named = record.provenance.file
+    label = Path(named).stem if named else record.provenance.rig or "run"
+    return played_log(record, plant, label, SIMULATED if record.provenance.simulated else "", out)
+
+
+def played_log(record: Record, plant: Plant, label: str, performed: str, out: PathLike | None = None) -> PlayedRun:
+    """A record in a page that plays it; `performed` as for `motion_page`."""
+    from upright.basis import SIMULATED
+    from upright.files import replace_file
+    from upright.live.motion import motion_page
+    from upright.report.page import Chapter
+
+    path = _page_path(out)
+    motion = _coordinates_of(record, plant)
+    if not motion:
+        raise BadInput(
+            f"play draws columns called {', '.join(c.name for c in plant.coordinates)}, and the record has "
+            f"{', '.join(record.names)}; rename them."
+        )
+    missing = [c.name for c in plant.coordinates if c.name not in motion]
+    no_unit = [n for n in motion if not record.units[n]]
+    remarks = [f"Not in the record, drawn at zero: {', '.join(missing)}."] if missing else []
+    remarks += [f"The record states no unit of {', '.join(no_unit)}; taken as SI."] if no_unit else []
+    kind, parts = ("simulated", ({}, motion)) if performed == SIMULATED else ("measured", (motion, {}))
+    text = motion_page(plant, record.t, *parts, name=label, performed=performed, remark=" ".join(remarks))
+    seconds = float(record.t[-1] - record.t[0])
+    chapter = Chapter(
+        title=f"Run '{label}' in a page", verdict=f"The {kind} motion of '{label}', {seconds:.4g} s.",
+        first_line=performed, warnings=tuple(remarks),
+        numbers={"run": label, "seconds": seconds} | ({"first_line": performed} if performed else {}),
+    )  # fmt: skip
+    return PlayedRun(record, chapter, [] if path is None else [replace_file(path, text.encode())], text)
+
+
+def _coordinates_of(record: Record, plant: Plant) -> dict[str, Array]:
+    """Columns of a plant's coordinates [rad or m]."""
+    from upright import units
+
+    motion: dict[str, Array] = {}
+    for c in plant.coordinates:
+        if c.name not in record.signals:
+            continue
+        unit = record.units[c.name]
+        if unit in ("", c.unit):
+            motion[c.name] = record[c.name]
+            continue
+        if not (units.known(unit) and units.same_dimension(unit, c.unit)):
+            raise BadInput(f"play draws {c.name} in {c.unit}, and its column is in {unit}; convert it first.")
+        motion[c.name] = units.converted(record[c.name], units.scale(unit))
+    return motion
+
+
+def _page_path(out: PathLike | None) -> Path | None:
+    path = None if out is None else Path(out)
+    if path is not None and path.suffix != ".html":
+        raise BadInput(f"play writes a page, a file ending in .html, got '{path}'.")
+    return path
 
 
 def live_part(name: str, draw: Callable[[], str], title: str = "Push it", *, short: bool = False) -> tuple[Part, ...]:

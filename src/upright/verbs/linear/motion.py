@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput
 from upright.records import Provenance, Record
+from upright.records.record import SIMULATED_NOTE
 from upright.systems import StateSpace
 from upright.systems.motion import march
 from upright.verbs.linear.feedback import Gains
@@ -44,7 +45,7 @@ def motion_of_linear(
 
 def simulated_origin(rig: str) -> Provenance:
     """Origin of a record of a rig that was not touched."""
-    return Provenance(reader="simulation", rig=rig, notes=("This log was simulated; no rig was touched.",))
+    return Provenance(reader="simulation", rig=rig, notes=(SIMULATED_NOTE,))
 
 
 def check_bounded(t: Array, x: Array, names: Sequence[str], so: str) -> None:
