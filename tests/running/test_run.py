@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import upright as up
-from upright.basis import DESCRIBED, MEASURED
+from upright.basis import DESCRIBED, MEASURED, SIMULATED
 from upright.errors import BadInput
 from upright.gains import feedback, filtered, place, prefilter
 from upright.laws import as_values
@@ -27,6 +27,7 @@ from upright.running import run as run_module
 from upright.running.chapter import run_chapter
 from upright.running.rig import excitation_law, model_and_truth, read_law, stage_of
 from upright.running.run import RunRequest, fresh, run_rig
+from upright.verbs.rig import RunAnswer
 
 RIG = make_rig("furuta")
 LINEAR = RIG.linear("inverted")
@@ -438,3 +439,17 @@ def test_a_twin_begins_off_upright_unless_somebody_says_otherwise(folder, tmp_pa
     answer = up.run(folder / "RIG.toml", law=folder / "design.json", duration=0.1, start=start, out=tmp_path)
     log, target = answer.value.log, answer.value.end.target
     assert log.columns["theta"][0] - target[1] == pytest.approx(math.radians(degrees), abs=2 * math.pi / 2000)
+
+
+def test_a_run_is_played_as_its_encoders_saw_it_and_says_that_no_rig_moved(tmp_path):
+    """Told by the run itself, and by its log when that is read back."""
+    rig = tmp_path / "RIG.toml"
+    rig.write_text('kind = "twin"\nmake = "furuta"\n', encoding="utf-8")
+    run = up.run(rig, excite="step 0.5", duration=0.1, check=False, watch=False, out=tmp_path)
+    played = run.play(out=tmp_path / "run_played.html")
+    assert (played.chapter.first_line, played.files) == (SIMULATED, (tmp_path / "run_played.html",))
+    assert played.value["psi"] == pytest.approx(run.value.log.columns["psi"])
+    again = up.read(run.value.log_path).play(run.value.model)
+    assert again.page == played.page
+    with pytest.raises(BadInput, match="nothing to play, since no loop began"):
+        RunAnswer(replace(run.value, log=None), run.chapter).play()

@@ -230,7 +230,7 @@ class Record(Shown):
         BadInput
             When the plant is not known or has no drawing, or no column is one of its coordinates.
         """
-        return views().play(self, rig, out)
+        return views().moving_page(self, rig, out)
 
     def replace(self, **changes: Any) -> Record:
         """Record with some fields changed, checked again."""

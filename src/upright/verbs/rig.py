@@ -131,12 +131,12 @@ class RunAnswer(Answer["RigRun"]):
         BadInput
             When no loop began, or the plant has no drawing.
         """
-        from upright.verbs.control.moving import played_log
+        from upright.verbs.control.moving import played_record
 
         run: RigRun = self.value
         if run.log is None:
             raise BadInput(f"there is nothing to play, since no loop began: {self.chapter.verdict}")
-        return played_log(run.log.record(), run.model.plant, run.log_path.stem, run.file.performed, out)
+        return played_record(run.log.record(), run.model.plant, run.log_path.stem, run.file.performed, out)
 
 
 TAP = 3.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import MISSING, fields, replace
 from functools import singledispatch
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -167,11 +168,18 @@ def animate(record: Record, *, plant: Any, speed: float, frames: int) -> Any:
     return drawn(record, plant=plant, speed=speed, frames=frames)
 
 
-def play(record: Record, rig: Any, out: Any) -> Any:
+def moving_page(record: Record, rig: Any, out: Any) -> Any:
     """A page in which the rig moves as it did; see `Record.play`."""
+    from upright.basis import SIMULATED
     from upright.verbs.control.moving import played_record
+    from upright.verbs.handover import rig_of
 
-    return played_record(record, rig, out)
+    if rig is None and record.plant is None:
+        raise BadInput("play needs what moved, with its numbers: run.play(rig), where rig is a plant, a rig or a fit.")
+    plant = record.plant if rig is None else rig_of(rig, "play", draws=0).plant
+    source = record.provenance
+    label = Path(source.file).stem if source.file else source.rig or "run"
+    return played_record(record, plant, label, SIMULATED if source.simulated else "", out)
 
 
 @styled

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from upright.basis import NOT_SUPPORTED, Basis
 from upright.errors import BadInput, UprightError
 from upright.verbs.answer import Answer
-from upright.verbs.handover import rig_of
 from upright.verbs.options import TrialOptions, known_options, rig_entries
 from upright.verbs.values import Start, read_pole_list, read_start
 
@@ -124,19 +123,7 @@ def run_page(score: RunScore, plant: Plant, label: str) -> str:
     return motion_page(plant, score.t[order], measured, simulated, name=label, remark=f"{ahead}{still}")
 
 
-def played_record(record: Record, source: Any = None, out: PathLike | None = None) -> PlayedRun:
-    """A record in a page that plays it, drawn by the plant that a source tells of, its own where that is None."""
-    from upright.basis import SIMULATED
-
-    if source is None and record.plant is None:
-        raise BadInput("play needs what moved, with its numbers: run.play(rig), where rig is a plant, a rig or a fit.")
-    plant = record.plant if source is None else rig_of(source, "play", draws=0).plant
-    named = record.provenance.file
-    label = Path(named).stem if named else record.provenance.rig or "run"
-    return played_log(record, plant, label, SIMULATED if record.provenance.simulated else "", out)
-
-
-def played_log(record: Record, plant: Plant, label: str, performed: str, out: PathLike | None = None) -> PlayedRun:
+def played_record(record: Record, plant: Plant, label: str, performed: str, out: PathLike | None = None) -> PlayedRun:
     """A record in a page that plays it; `performed` as for `motion_page`."""
     from upright.basis import SIMULATED
     from upright.files import replace_file
