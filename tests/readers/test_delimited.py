@@ -180,6 +180,11 @@ def test_decimal_commas_are_seen_below_rows_of_whole_numbers():
     assert found.t[-1] == pytest.approx(1.5055)
 
 
+def test_a_title_above_names_with_units_is_no_line_of_names() -> None:
+    log = read_source(Source(file="a.csv", data=b"Run 3,,\nTime (s),Angle (deg),Voltage (V)\n0,20,0\n0.01,19,0\n"))
+    assert log.names == ("Angle (deg)", "Voltage (V)")
+
+
 def test_a_first_column_of_another_name_counts_in_the_unit_that_it_states() -> None:
     seen = record("Stempel [ms],x\n0,1\n5,2\n10,3\n")
     np.testing.assert_allclose(seen.t, [0, 5e-3, 10e-3])

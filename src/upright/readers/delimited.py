@@ -105,7 +105,8 @@ def _names(above: Sequence[str], row: str, delimiter: str | None, labels: Sequen
 def _are_units(cells: Sequence[str]) -> bool:
     """Whether a line says in which unit each column is: a time the first, and the others where they have one."""
     units = [cell.strip("()[] ") for cell in cells]
-    return bool(stated_time_unit(f"({units[0]})")) and all(stated_unit(f"({unit})") for unit in units if unit)
+    named = any(re.search(r"[()\[\]]", unit) for unit in units)  # a unit in brackets has its name before it
+    return not named and bool(stated_time_unit(f"({units[0]})")) and all(stated_unit(f"({u})") for u in units if u)
 
 
 def _first_lines(text: str) -> list[str]:
