@@ -3,6 +3,7 @@
 One motion of 5 s at 1 kHz (Furuta pendulum, dry friction on both joints, counts, sampled law) in Node, beside the same
 kernel as machine code of this processor; then the page of `upright play` in Chromium: the answer of 200 rigs of 3 s to
 a change, by the clock on the wall and with as many workers as there are processors, and pictures a second meanwhile.
+Last, the traces of a run of 1,000,000 samples beside those of one of 10,000: written, first drawn, zoomed.
 """
 
 from __future__ import annotations
@@ -63,6 +64,22 @@ PICTURES = """new Promise((tell) => {
   const look = () => performance.now() - t > 3000 ? tell((upright.frames - k) / 3) : requestAnimationFrame(look);
   look();
 })"""
+
+
+ZOOMS = """(async () => {
+  const picture = () => new Promise(requestAnimationFrame), zooms = [];
+  document.querySelector("figure:has(script.traces)").scrollIntoView();
+  while (!(TRACES.length && TRACES[0].plots[0].bbox.width > 0)) await picture();
+  const drawn = performance.now();
+  for (let i = 0; i < 20; i++) {
+    const begun = performance.now();
+    TRACES[0].zoom(i % 10 < 5 ? 0.5 : 2);
+    await picture();
+    await picture();
+    zooms.push((performance.now() - begun) / 1000);
+  }
+  return { drawn: drawn / 1000, zooms, samples: TRACES[0].t.length };
+})()"""
 
 
 def rig() -> Any:
@@ -132,6 +149,61 @@ def page(path: Path, answers: int) -> dict[str, Any]:
     return {"answers": [1e-3 * t for t in times], "frames": frames, "first": 1e-3 * first}
 
 
+def write_long(path: Path, samples: int) -> float:
+    """CPU seconds in which the page of a run of so many samples is written, a millisecond each."""
+    import numpy as np
+
+    from upright.identification import RunScore
+    from upright.report.fit.figures import fit_figure
+    from upright.report.fit.interactive import score_traces
+    from upright.report.html import write_html
+    from upright.report.page import Chapter, Part, Picture
+
+    t, arm = np.arange(samples) * 1e-3, rig().plant
+    model = np.column_stack([0.4 * np.sin(2 * t), np.cos(7 * t) * np.exp(-0.002 * t)])
+    measured = model + 1e-3 * np.random.default_rng(0).standard_normal(model.shape)
+    score = RunScore(
+        role="predict", fit_percent={"psi": 99.0, "theta": 99.0}, horizon=None, t=t, y=measured, simulated=model,
+        measured=("psi", "theta"),
+    )  # fmt: skip
+    drawn = Picture(
+        name="run", draw=lambda: fit_figure(score, arm, title="run"), caption="A run.", description="A run.",
+        interactive=lambda: score_traces({"model": score}, type(arm), name="run"),
+    )  # fmt: skip
+    before = time.process_time()
+    write_html(path, Chapter(title="A run", verdict="", parts=(Part("Run", (drawn,)),)))
+    return time.process_time() - before
+
+
+def long_runs(folder: Path, rounds: int) -> list[Line]:
+    """Traces of a million samples beside those of ten thousand."""
+    lines: list[Line] = []
+    for samples in (10_000, 1_000_000):
+        path = folder / f"{samples}.html"
+        write_long(path, samples)  # what is imported once
+        written = [write_long(path, samples) for _ in range(rounds)]
+        seen = [visited(path, ZOOMS) for _ in range(rounds)]
+        note = f"{path.stat().st_size:,} bytes, {seen[0]['samples']:,} of {samples:,} samples"
+        lines.append(Line(contender=f"page of {samples:,} samples, written", seconds=spread(written), note=note))
+        lines.append(Line(contender="its traces, first drawn", seconds=spread([s["drawn"] for s in seen])))
+        lines.append(Line(contender="and zoomed", seconds=spread([z for s in seen for z in s["zooms"]])))
+    return lines
+
+
+def visited(path: Path, script: str) -> Any:
+    """What a script answers in a page that a browser has opened."""
+    from playwright.sync_api import sync_playwright
+
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+    with sync_playwright() as runner:
+        opened = runner.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        tab = opened.new_page()
+        tab.goto(path.as_uri())
+        answer = tab.evaluate(script)
+        opened.close()
+    return answer
+
+
 def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     """Kernel, page, browser; what is missing here is said."""
     import upright as up
@@ -169,4 +241,6 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
             Line(contender="first picture", seconds=spread([seen["first"]]), target=Target(most=0.3, of="seconds"),
                  note=f"{seen['frames']:.0f} pictures a second (at least {FRAMES:.0f} asked)")
         )  # fmt: skip
+        progress("long runs")
+        lines += long_runs(Path(folder), 2 if quick else 5)
     return lines

@@ -13,13 +13,15 @@ from upright.physics import Plant
 from upright.physics.outline import in_javascript
 from upright.records import Array
 from upright.report.html import rendered
-from upright.report.interactive.traces import packed
+from upright.report.interactive.traces import extreme_rows, packed
 from upright.report.symbols import plain
 
 RATE = 60.0
 """Pictures a second at most: a screen shows no more."""
 MOST = 3600
 """Pictures of a run at most, a minute of it; a longer run has fewer a second."""
+POINTS = 600
+"""Points of a trace at most, two for every third pixel of its width."""
 
 
 def motion_page(
@@ -69,8 +71,10 @@ def motion_page(
     ]
     if not all(np.isfinite(s).all() for _, s in columns if s is not None):
         raise BadInput(f"the simulated motion of {name} grows beyond all bounds, so it cannot be shown.")
+    step = seconds / (frames - 1)
+    seldom = f"; a picture every {step:.2g} s, traces with every extreme" if frames == MOST else ""
     data = {
-        "frames": frames, "step": seconds / (frames - 1), "start": first,
+        "frames": frames, "step": step, "start": first,
         "coordinates": [
             {"name": c.name, "unit": c.unit}
             | {of: None if x is None else packed(x) for of, x in zip(("measured", "simulated"), both, strict=True)}
@@ -89,13 +93,13 @@ def motion_page(
         policy=f"default-src 'none'; script-src {source_hash(script)}; style-src {source_hash(style)}",
         style=Markup(style), script=Markup(script), picture=Markup(picture), view=view, name=name, frames=frames,
         what=what, performed=performed,
-        strips=[_strip(c.name, c.unit, m, s) for c, (m, s) in zip(coordinates, columns, strict=True)],
-        drawn="Drawn to scale from the plant's numbers, rods as if uniform.", remark=remark,
+        strips=[_strip(c.name, c.unit, t, measured.get(c.name), simulated.get(c.name)) for c in coordinates],
+        drawn=f"Drawn to scale from the plant's numbers, rods as if uniform{seldom}.", remark=remark,
     )  # fmt: skip
 
 
-def _strip(name: str, unit: str, measured: Array | None, simulated: Array | None) -> dict[str, str]:
-    """Lines of one coordinate over time, in a box of 1000 by 100; empty where there are none."""
+def _strip(name: str, unit: str, t: Array, measured: Array | None, simulated: Array | None) -> dict[str, str]:
+    """Lines of one coordinate over times t, in a box of 1000 by 100; empty where there are none."""
     base = simulated if measured is None else measured
     if base is None:
         return {}
@@ -105,13 +109,13 @@ def _strip(name: str, unit: str, measured: Array | None, simulated: Array | None
     scale, of = (180 / np.pi, "deg") if unit == "rad" else (100.0, "cm")
     span = f"{scale * low:.3g} to {scale * high:.3g} {of}".replace("-", "\u2212")
     lines = {
-        kind: "" if values is None else _points(np.clip(values, low, high), low, high)
+        kind: "" if values is None else _points(t, np.clip(values, low, high), low, high)
         for kind, values in (("measured", measured), ("simulated", simulated))
     }
     return {"symbol": plain(name), "range": f"[{span}]", "label": f"{plain(name)} over time, from {span}", **lines}
 
 
-def _points(values: Array, low: float, high: float) -> str:
-    rows = np.unique(np.linspace(0, values.size - 1, min(values.size, 1200)).astype(int))
-    x, y = 1000 * rows / (values.size - 1), 100 * (high - values[rows]) / (high - low)
-    return " ".join(f"{a:.5g},{b:.4g}" for a, b in zip(x, y, strict=True))
+def _points(t: Array, values: Array, low: float, high: float) -> str:
+    rows = extreme_rows([values], values.size, POINTS)
+    x, y = 1000 * (t[rows] - t[0]) / (t[-1] - t[0]), 100 * (high - values[rows]) / (high - low)
+    return " ".join(f"{a:.4g},{b:.4g}" for a, b in zip(x, y, strict=True))
