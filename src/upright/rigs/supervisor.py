@@ -301,7 +301,8 @@ class Supervisor:
         if self.clock is not None and (longer := self._ticking.sees(tick.time, self.clock())) != 1.0:
             self._give_up(
                 Fault.MODEL, f"{self.about.name} is not timed as it says: its tick lasts {longer:.3g} times "
-                f"{1e3 * self.about.period:.4g} ms by this computer's clock. Look at the board's clock and prescaler.",
+                f"{1e3 * self.about.period:.4g} ms in the mean, by this computer's clock. Look at the board's clock "
+                "and prescaler.",
             )  # fmt: skip
         self._look(self.readings(tick))
         if self._running is None:
