@@ -126,9 +126,8 @@ class Played:
                 continue
             drive, pendulum = stills[i]
             if drive.sees(away[i][0], away[i], commands[i]):
-                weak = drive.rests or watch.weak(i)
-                what = "the drive, which moves nothing" if weak else "an encoder that shows not a single count"
-                lane.stopped, lane.why = t, what
+                dead = "an encoder that shows not a single count"
+                lane.stopped, lane.why = t, "the drive, which moves nothing" if drive.rests else dead
             elif pendulum.sees(away[i]):
                 lane.stopped, lane.why = t, "an encoder that shows not a single count"
             elif says[i]:

@@ -21,7 +21,7 @@ WEAK = Suspicion(name="the drive", factor=0.5)
 def doubts(monkeypatch):
     """Doubts of a rig whose watch and counters say what they are told."""
 
-    def of(*, drive=False, pendulum=False, rests=False, weak=False, speaks=False, likely=()):
+    def of(*, drive=False, pendulum=False, rests=False, speaks=False, likely=()):
         class Told:
             name, which = "psi", 0
 
@@ -38,9 +38,6 @@ def doubts(monkeypatch):
             @property
             def rests(self):
                 return rests
-
-            def weak(self):
-                return weak
 
             def speaks(self):
                 return np.array([speaks]), np.array([0])
@@ -66,7 +63,7 @@ def said(doubts):
 
 
 def test_what_moves_as_it_should_is_not_doubted(doubts):
-    sound = doubts(weak=True, likely=(TURNED,))
+    sound = doubts(rests=True, likely=(TURNED,))
     assert said(sound) is None
     assert not sound.body_trusted
 
@@ -74,9 +71,6 @@ def test_what_moves_as_it_should_is_not_doubted(doubts):
 @pytest.mark.parametrize(
     ("seen", "fault", "sentence", "trusted"),
     [
-        ({"drive": True, "weak": True}, Fault.MODEL,
-         "psi does not move as its command must have moved it; likeliest is that the drive gives too little, or "
-         "something holds it fast. Check supply, cable and current limit.", False),
         ({"drive": True, "rests": True}, Fault.MODEL,
          "psi does not move as its command must have moved it; likeliest is that the drive gives too little, or "
          "something holds it fast. Check supply, cable and current limit.", False),
@@ -86,9 +80,6 @@ def test_what_moves_as_it_should_is_not_doubted(doubts):
         ({"drive": True, "pendulum": True}, Fault.ENCODER,
          "psi shows not a single count although its command must have moved it: its encoder is dead, or something "
          "holds it fast.", False),
-        ({"pendulum": True, "weak": True}, Fault.ENCODER,
-         "theta shows not a single count although what carries it was accelerated: its encoder is dead, or something "
-         "holds it fast.", True),
         ({"speaks": True, "likely": (TURNED,)}, Fault.MODEL,
          "bench 3 does not move as its model does; likeliest is theta shown the wrong way round. Check that encoder's "
          "wiring and counts (upright rig doctor); if a hand pushed it, start again.", True),

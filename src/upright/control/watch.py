@@ -299,11 +299,6 @@ class Watch:
         grossly, which = self.gross.speaks()
         return self._says | grossly, np.where(grossly, self._gross[which], self._best)
 
-    def weak(self, lane: int = 0) -> bool:
-        """Whether a body that shows nothing is likelier driven by too little than read by a dead encoder."""
-        drive = len(self.odds) - len(STRENGTHS)
-        return bool(self.odds[drive:, lane].max() > self.odds[0, lane] + LEADS)
-
     def likely(self, lane: int = 0) -> tuple[Suspicion, ...]:
         """What may be wrong, likeliest first, as far as one is not plainly less likely than the next; none where all
         is as likely to be sound.

@@ -35,7 +35,7 @@ class Doubts:
         self._watch.see([away], command)
         for still, held in ((self._drive.sees(readings[self._drive.which], away, command), self._drive),
                             (self._pendulum.sees(away), self._pendulum)):  # fmt: skip
-            if still and held is self._drive and (self._drive.rests or self._watch.weak()):
+            if still and held is self._drive and self._drive.rests:
                 return Fault.MODEL, (
                     f"{held.name} does not move as its command must have moved it; likeliest is that the drive gives "
                     "too little, or something holds it fast. Check supply, cable and current limit."
