@@ -80,6 +80,16 @@ def test_every_picture_and_table_of_a_notebook_is_introduced(path):
     assert "ccc" not in kinds
 
 
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
+def test_a_section_of_a_notebook_begins_a_line_and_comes_once(path):
+    """Two cells that a merge ran into one show here."""
+    text = "\n".join(cell.source for cell in stored_in(path).cells if cell.cell_type == "markdown")
+    text = re.sub(r"```.*?```", "", text, flags=re.S)
+    sections = re.findall(r"^#+ .*", text, re.M)
+    assert sections == list(dict.fromkeys(sections))
+    assert not re.findall(r"^.*\w.*#+ .*", text, re.M)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=stem)
 def test_the_hidden_solution_of_an_exercise_runs_by_itself(path, tmp_path, monkeypatch):
