@@ -1,18 +1,19 @@
-"""Does a chance told before a run mean what it says? 500 random twins, told from an identification, then run.
+"""Do loops hold as often as predicted? 500 random twins, each identified, predicted and then run.
 
 Every twin is another pendulum on a cart or Furuta, its numbers some percent off the design. It is identified by itself:
 half a volt up and down for 2 s while it hangs, both encoders logged every 8 ms with noise of 0.05 to 2 degrees on top,
 and Gauss-Newton on the nonlinear model with dry friction for six numbers and the drive's gain; the covariance is what
-that noise leaves, with the spread of the make's friction known beforehand. Noise is all that is wrong there, so that
+that noise leaves, with the rig model's spread of friction known beforehand. Noise is all that is wrong there, so that
 the covariance is honest; twins identified by frequency response, as in experiment 1b, are looked at apart.
 Poles are one of Table 1's sets, velocities come from plain or filtered differences or a Kalman filter, the limit is 2
 to 5 V and the command up to 4 ms late. The start (tilt and tap in some proportion) lies about the edge of what the
-identified model recovers. The chance comes from 200 rigs drawn from the covariance, each with its own dry friction of
-the day and its own error of the hand; then the law runs on the true rig, with true friction of its day and one hand.
+identified model recovers. The probability predicted is the share that holds of 200 rigs drawn from the covariance, each
+with dry friction of its own day and its own error of the hand; then the law runs once on the true rig, with the
+friction of its day and one hand.
 Twins of a third kind have physics that the model lacks (`upright.experiments.nonideal`: friction larger close to rest,
 ripple, latency, a frame out of level, encoders with play and off centre), and their fits leave many times their errors
-unexplained. Where a twin is identified as in 1b, the chance is that of `upright regulate`: over the fit's covariance,
-the friction law close to rest and the day.
+unexplained. Where a twin is identified as in 1b, the probability is that of `upright regulate`: over the fit's
+covariance, the friction law close to rest and day-to-day variation.
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ BINS = 10
 
 
 @dataclass(frozen=True)
-class Told:
-    """One twin: the chance told, and whether it was held."""
+class Twin:
+    """One twin: the probability predicted, and whether the law held it."""
 
-    chance: float
+    predicted: float
     held: bool
 
 
@@ -138,7 +139,7 @@ def hands(start: Array, rng: np.random.Generator, lanes: int) -> Array:
     return start + rng.normal(size=(lanes, 4)) * np.array([0, 0, *HAND])
 
 
-def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False) -> Told | None:
+def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False) -> Twin | None:
     """One twin from identification to outcome; `swept` is a folder for one identified as in experiment 1b."""
     from upright import gains
     from upright.control.score import outcomes
@@ -178,12 +179,12 @@ def one(make: str, seed: int, *, swept: Path | None = None, flawed: bool = False
     edge = steps[-1] if held.all() else steps[int(np.argmin(held))]
     start = outwards * edge * math.exp(rng.normal(-0.01, 0.045))
     run = partial(outcomes, law=law, at="inverted", seconds=3.0)
-    told = run(rig, starts=hands(start, rng, LANES), parameters=others)
-    came = run(truth, starts=hands(start, rng, 1), parameters=of_the_day(truth.plant, {}, rng, 1))
-    return Told(float(np.mean(told.held)), bool(came.held[0]))
+    predicted = run(rig, starts=hands(start, rng, LANES), parameters=others)
+    measured = run(truth, starts=hands(start, rng, 1), parameters=of_the_day(truth.plant, {}, rng, 1))
+    return Twin(float(np.mean(predicted.held)), bool(measured.held[0]))
 
 
-def _twin(swept: bool, flawed: bool, twin: tuple[str, int]) -> Told | None:
+def _twin(swept: bool, flawed: bool, twin: tuple[str, int]) -> Twin | None:
     with TemporaryDirectory() as folder:
         return one(*twin, swept=Path(folder) if swept else None, flawed=flawed)
 
@@ -201,7 +202,7 @@ class Calibration:
     """Brier score and Murphy's parts of it (1973), over bins of equal width.
 
     brier = reliability - resolution + uncertainty, but for what varies inside a bin; `expected` is the score of
-    chances that are right, `z` is Spiegelhalter's (1986), standard normal then, as is `z_of_all`, of how many came.
+    probabilities that are right, `z` is Spiegelhalter's (1986), standard normal then, like `z_of_all` of the sum.
     """
 
     brier: float
@@ -214,28 +215,28 @@ class Calibration:
 
     @property
     def skill(self) -> float | None:
-        """Share of the uncertainty that the chances take away; None where all outcomes were the same: there is none."""
+        """Share of the uncertainty that predictions remove; None where all outcomes were the same: there is none."""
         return 1 - self.brier / self.uncertainty if self.uncertainty else None
 
 
-def calibration(chances: Array, came: NDArray[np.bool_]) -> Calibration:
-    """How good chances were, given what came."""
-    base = float(came.mean())
-    place = np.clip((chances * BINS + 1e-9).astype(int), 0, BINS - 1)
+def calibration(predicted: Array, held: NDArray[np.bool_]) -> Calibration:
+    """How good predicted probabilities were, given which twins held."""
+    base = float(held.mean())
+    place = np.clip((predicted * BINS + 1e-9).astype(int), 0, BINS - 1)
     reliability = resolution = 0.0
     for b in range(BINS):
         inside = place == b
         if inside.any():
-            share = float(came[inside].mean())
-            reliability += inside.mean() * (chances[inside].mean() - share) ** 2
+            share = float(held[inside].mean())
+            reliability += inside.mean() * (predicted[inside].mean() - share) ** 2
             resolution += inside.mean() * (share - base) ** 2
-    sure = np.sum(chances * (1 - chances))
-    spread = np.sum((1 - 2 * chances) ** 2 * chances * (1 - chances))
+    sure = np.sum(predicted * (1 - predicted))
+    spread = np.sum((1 - 2 * predicted) ** 2 * predicted * (1 - predicted))
     return Calibration(
-        brier=float(np.mean((chances - came) ** 2)), expected=float(np.mean(chances * (1 - chances))),
+        brier=float(np.mean((predicted - held) ** 2)), expected=float(np.mean(predicted * (1 - predicted))),
         reliability=float(reliability), resolution=float(resolution), uncertainty=base * (1 - base),
-        z=float(np.sum((came - chances) * (1 - 2 * chances)) / math.sqrt(spread)) if spread else 0.0,
-        z_of_all=float(np.sum(came - chances) / math.sqrt(sure)) if sure else 0.0,
+        z=float(np.sum((held - predicted) * (1 - 2 * predicted)) / math.sqrt(spread)) if spread else 0.0,
+        z_of_all=float(np.sum(held - predicted) / math.sqrt(sure)) if sure else 0.0,
     )  # fmt: skip
 
 
@@ -249,85 +250,85 @@ def run(
         count = few if quick else all_
         progress(f"{count} twins {what}")
         twins = [(("furuta", "linear")[i % 2], 1 + i // 2) for i in range(count)]
-        told, each = of_each(partial(_twin, swept, flawed), twins, workers)
-        kept = [t for t in told if t is not None]
-        chances, came = np.array([t.chance for t in kept]), np.array([t.held for t in kept])
+        outcome, each = of_each(partial(_twin, swept, flawed), twins, workers)
+        kept = [t for t in outcome if t is not None]
+        predicted, held = np.array([t.predicted for t in kept]), np.array([t.held for t in kept])
         if not kept:
             lines.append(Line(contender=what, seconds=each, note=f"none of {count} identifications succeeded"))
             continue
-        found = calibration(chances, came)
+        found = calibration(predicted, held)
         skill = "not defined, all ended alike" if found.skill is None else f"{found.skill:.2f}"
         lines.append(
             Line(
                 contender=what, seconds=each, error=found.brier,
                 note=f"Brier {found.brier:.3f}, {found.expected:.3f} if calibrated; skill {skill}; "
-                f"Spiegelhalter z {found.z:+.2f}; {100 * came.mean():.0f} % of {len(kept)} held, "
-                f"told {100 * chances.mean():.0f} %",
+                f"Spiegelhalter z {found.z:+.2f}; {100 * held.mean():.0f} % of {len(kept)} held, "
+                f"predicted {100 * predicted.mean():.0f} %",
             )
         )  # fmt: skip
-        rows += table(what, found, chances, came, count - len(kept))
+        rows += table(what, found, predicted, held, count - len(kept))
         if markdown is not None and what == "identified by steps":
-            save(reliability_figure(chances, came, bins=BINS), IMAGE)
+            save(reliability_figure(predicted, held, bins=BINS), IMAGE)
     if markdown is not None:
-        picture = ["", f"![What came, against the chance told](../{IMAGE.as_posix()})"]
+        picture = ["", f"![Share of twins that held, against the probability predicted](../{IMAGE.as_posix()})"]
         markdown.write_text(page("regulation", "Calibration", __doc__, [*picture, *rows]), encoding="utf-8")
     return lines
 
 
 @styled
-def reliability_figure(chances: Array, came: NDArray[np.bool_], *, bins: int = 10) -> Any:
-    """How often what was told with a chance came true, with 95 % Wilson intervals, and how often each was told."""
+def reliability_figure(predicted: Array, held: NDArray[np.bool_], *, bins: int = 10) -> Any:
+    """Share that held by the probability predicted, with 95 % Wilson intervals, and how often each was predicted."""
     from scipy.stats import binomtest
 
     drawing = figure(4.6, width=5.0)
     grid: Any = drawing.add_gridspec(2, 1, height_ratios=(4, 1))
     ax: Any = drawing.add_subplot(grid[0])
     below: Any = drawing.add_subplot(grid[1], sharex=ax)
-    ax.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, label="as told")
+    ax.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, label="as predicted")
     edges = np.linspace(0, 1, bins + 1)
-    place = np.clip((chances * bins + 1e-9).astype(int), 0, bins - 1)
+    place = np.clip((predicted * bins + 1e-9).astype(int), 0, bins - 1)
     for b in range(bins):
         inside = place == b
         if not inside.any():
             continue
-        low, high = binomtest(int(came[inside].sum()), int(inside.sum())).proportion_ci(method="wilson")
-        mean, share = 100 * float(chances[inside].mean()), 100 * float(came[inside].mean())
+        low, high = binomtest(int(held[inside].sum()), int(inside.sum())).proportion_ci(method="wilson")
+        mean, share = 100 * float(predicted[inside].mean()), 100 * float(held[inside].mean())
         ax.errorbar(
             mean, share, yerr=[[share - 100 * low], [100 * high - share]], fmt="o", color=BLUE, capsize=2.5,
-            markersize=5, label="came, with 95 % interval" if b == place.min() else None,
+            markersize=5, label="held, with 95 % interval" if b == place.min() else None,
         )  # fmt: skip
     below.bar(
         100 * edges[:-1], np.bincount(place, minlength=bins), 100 / bins, align="edge", color=SKY, edgecolor=BLACK
     )
-    ax.set_ylabel("came true [%]")
+    ax.set_ylabel("held [%]")
     ax.set_xlim(0, 100)
     ax.set_ylim(-3, 103)
     ax.tick_params(labelbottom=False)
     below.set_ylabel("twins")
-    below.set_xlabel("chance told before the run [%]")
+    below.set_xlabel("probability predicted before the run [%]")
     ax.legend(loc="upper left")
     return drawing
 
 
-def table(what: str, found: Calibration, chances: Array, came: NDArray[np.bool_], strayed: int) -> list[str]:
+def table(what: str, found: Calibration, predicted: Array, held: NDArray[np.bool_], strayed: int) -> list[str]:
     """Two tables of one kind of twins."""
-    place = np.clip((chances * BINS + 1e-9).astype(int), 0, BINS - 1)
+    place = np.clip((predicted * BINS + 1e-9).astype(int), 0, BINS - 1)
     skill = "not defined, all ended alike" if found.skill is None else f"{100 * found.skill:.1f} %"
     lost = f"; for {strayed} more the identification said that it had failed" if strayed else ""
     out = [
-        "", f"## {chances.size} twins {what}{lost}", "", "| | |", "|---|---|",
-        f"| Brier score | {found.brier:.4f} |", f"| the same if the chances are right | {found.expected:.4f} |",
+        "", f"## {predicted.size} twins {what}{lost}", "", "| | |", "|---|---|",
+        f"| Brier score | {found.brier:.4f} |", f"| the same if the probabilities are right | {found.expected:.4f} |",
         f"| reliability (0 is best) | {found.reliability:.4f} |", f"| resolution | {found.resolution:.4f} |",
-        f"| uncertainty: the score of always telling {100 * came.mean():.1f} % | {found.uncertainty:.4f} |",
+        f"| uncertainty: the score of always predicting {100 * held.mean():.1f} % | {found.uncertainty:.4f} |",
         f"| skill over that | {skill} |",
-        f"| Spiegelhalter's z (within ±1.96 for 95 % of right chances) | {found.z:+.2f} |",
-        f"| z of how many held, of {chances.sum():.1f} told (within ±1.96 likewise) | {found.z_of_all:+.2f} |",
-        "", "| chance told | twins | mean told | came true |", "|---|---|---|---|",
+        f"| Spiegelhalter's z (within ±1.96 for 95 % of right probabilities) | {found.z:+.2f} |",
+        f"| z of how many held, of {predicted.sum():.1f} predicted (within ±1.96 likewise) | {found.z_of_all:+.2f} |",
+        "", "| probability predicted | twins | mean predicted | held |", "|---|---|---|---|",
     ]  # fmt: skip
     for b in range(BINS):
         inside = place == b
         if inside.any():
-            told, true = 100 * chances[inside].mean(), 100 * came[inside].mean()
+            mean, share = 100 * predicted[inside].mean(), 100 * held[inside].mean()
             bounds = f"{100 * b // BINS} to {100 * (b + 1) // BINS} %"
-            out.append(f"| {bounds} | {inside.sum()} | {told:.1f} % | {true:.1f} % |")
+            out.append(f"| {bounds} | {inside.sum()} | {mean:.1f} % | {share:.1f} % |")
     return out
