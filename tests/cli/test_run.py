@@ -57,7 +57,7 @@ def test_mistakes_are_answered_in_a_sentence(bench):
     for words, said in (
         (["run", "--rig", "RIG.toml"], "needs either a law"),
         (["run", "--rig", "NO.toml", "--law", "design.json"], "There is no file"),
-        (["run", "--rig", "RIG.toml", "--law", "RIG.toml"], "no JSON"),
+        (["run", "--rig", "RIG.toml", "--law", "RIG.toml"], "not JSON"),
         (["run", "--rig", "RIG.toml", "--law", "design.json", "--reference", "step 0.1"], "follows no reference"),
         (["rig", "doctor", "design.json"], "TOML"),
     ):

@@ -98,7 +98,7 @@ def test_options_come_before_the_study(study, tmp_path):
     assert (rig.limit, rig.period, rig.travel) == (6.0, 1e-3, 0.1)
     np.testing.assert_allclose(rig.per_unit, (20_000, 2000 / math.tau))
     told = {row[0]: row[1:] for row in next(p for p in done.chapter.parts if p.title == "The rig").content[0].rows}
-    assert told["largest command that passes"] == ("6 V", "--limit")
+    assert told["command limit"] == ("6 V", "--limit")
     assert told["encoder counts of x"] == ("20000 1/m", "known")
     assert told["first-order lag"] == ("0.004 s", "known")
     assert any("Assumed, not measured: dead time" in w for w in done.chapter.warnings)
@@ -113,7 +113,7 @@ def without(*lines: str) -> str:
 @pytest.mark.parametrize(
     ("lines", "words"),
     [
-        (("limit",), r"largest command that passes \(--limit 10 or \[actuator\] limit"),
+        (("limit",), r"command limit \(--limit 10 or \[actuator\] limit"),
         (("servo_period",), r'servo period \(--period "2 ms" or \[rig\] servo_period = "2 ms"\)'),
         (("counts_per_rev",), r"encoder counts of theta \(--counts .* or \[sensors.theta\] counts_per_rev"),
         (("limit", "counts_per_m"), r"largest command .*; encoder counts of x"),

@@ -33,7 +33,7 @@ class Maker:
         hang = ("put 0 0 0 0", "release", "run 200")  # simavr shows no more than 80 edges in a millisecond
         if "Shall" in sentence:
             return self._agrees
-        if sentence.startswith("Has the bridge"):
+        if sentence.startswith("Does the bridge have"):
             return self._supplied
         if "Move psi" in sentence:
             self.board.do(f"put {math.pi / 2} 0 0 0", "hold", "run 200")
@@ -127,7 +127,7 @@ WIRED = {
     "lines for counts": (["scale 0 0.25"], {}, "psi by hand", "0.25 times"),
     "half the counts": (["scale 1 0.5"], {}, "theta by hand", "0.5 times"),
     "no encoder": (["dead 1"], {}, "theta by hand", "not connected"),
-    "a button in the wrong wire": ([], {"button": False}, "stop button", "moved although it is pressed"),
+    "a button in the wrong wire": ([], {"button": False}, "stop button", "moved although the button is pressed"),
 }  # fmt: skip
 
 

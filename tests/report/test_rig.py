@@ -209,6 +209,6 @@ def test_a_rig_s_table_has_what_its_numbers_rest_on_but_no_signs_and_zeros():
     }
     table = rig_table(up.Rig(plant=CART, hardware=Hardware(entries=entries)))
     assert table.rows == (
-        ("largest command that passes", "10 V", "--limit"), ("encoder counts of theta", "4096 1/rev", "known"),
+        ("command limit", "10 V", "--limit"), ("encoder counts of theta", "4096 1/rev", "known"),
     )  # fmt: skip
     assert (table.headings, table.numbers) == (("", "value", "from"), (1,))

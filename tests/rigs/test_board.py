@@ -287,7 +287,9 @@ def test_a_coordinate_beyond_its_travel_or_lean_is_stopped_with_what_it_is():
     beside, _ = watched([(0, 0)], lean=0.2)
     tick = beside.rig.exchange(0.0)
     beside.step(replace(tick, tick=tick.tick + 1, counts=(0, 20)))
-    with pytest.raises(RigStopped, match=r"Theta left what is held by 12 degrees, more than 11\.5 degrees"):
+    with pytest.raises(
+        RigStopped, match=r"Theta is 12 degrees from where it is to be stabilised, more than 11\.5 degrees"
+    ):
         beside.step(replace(tick, tick=tick.tick + 2, counts=(0, 21)))
     beside, _ = watched([(0, 0)], limits=replace(WIDE, travel=(0.05, 1e6)))
     tick = beside.rig.exchange(0.0)

@@ -419,7 +419,7 @@ def test_the_first_firmware_is_refused_by_the_length_of_its_answer():
 def test_a_line_that_was_closed_is_not_opened_again():
     rig = opened(FakeBoard())
     rig.close()
-    with pytest.raises(RigStopped, match="Its line was closed; make the rig anew with another line"):
+    with pytest.raises(RigStopped, match="Its line was closed; open the rig again on another line"):
         rig.open()
 
 

@@ -47,7 +47,9 @@ def test_a_drive_that_does_not_obey_is_said_after_its_stop():
     scene.port.push([0.0, 1.0])
     scene.run(0.04)
     scene.port.write = scene.port.enable = lambda *_: None
-    with pytest.raises(RigStopped, match=r"^By hand\. It gains energy .* the drive does not obey; hit the button\."):
+    with pytest.raises(
+        RigStopped, match=r"^By hand\. It gains energy .* the drive does not obey; press the stop button\."
+    ):
         scene.beside.give_up(Fault.STOP, "By hand.")
     assert Fault.MODEL in scene.beside.faults
 

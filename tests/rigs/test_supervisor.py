@@ -185,7 +185,7 @@ def test_a_start_does_not_yank_the_arm_and_takes_the_nearest_turn():
 def test_gains_that_let_the_model_fall_are_refused_before_arming():
     wrong = replace(LAW, C=-LAW.C, D=-LAW.D)
     scene = Scene()
-    with pytest.raises(RigStopped, match="its model falls, e-fold"):
+    with pytest.raises(RigStopped, match="its model falls, by a factor e"):
         scene.started(law=wrong)
     assert not scene.port._enabled
 
@@ -194,7 +194,7 @@ def test_a_law_that_does_nothing_is_refused_with_the_time_in_which_its_model_fal
     """Open, the model grows by its unstable pole: e-fold in 1/p."""
     idle = state_feedback([0.0] * 4, RIG.period)
     growth = MODEL.poles().real.max()
-    with pytest.raises(RigStopped, match=rf"its model falls, e-fold in {1 / growth:.3g} s; design again"):
+    with pytest.raises(RigStopped, match=rf"its model falls, by a factor e every {1 / growth:.3g} s"):
         Scene().started(law=idle)
 
 

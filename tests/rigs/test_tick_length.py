@@ -89,6 +89,6 @@ def test_who_names_a_host_that_slept_is_its_board_s_watchdog():
 def test_a_run_on_a_board_with_a_slow_tick_is_stopped_with_its_length():
     scene = Scene().started()
     scene.beside.clock = lambda: 2.0 * scene.rig.sample.time
-    with pytest.raises(RigStopped, match=r"its tick lasts 2 times 0\.884 ms in the mean, by this computer's clock"):
+    with pytest.raises(RigStopped, match=r"on average its ticks lasted 2 times 0\.884 ms by this computer's clock"):
         scene.run(1.0)
     assert scene.told[-1] == ("fault", 0.0, False)

@@ -86,8 +86,8 @@ def test_plugs_in_each_other_s_place_are_told_from_a_dead_encoder(tmp_path, wire
     wired(swapped)
     checkup = check_up(rig_file(tmp_path))
     finding = found(checkup, "psi by hand")
-    assert (finding.good, finding.fix) == (False, "change the plugs of psi and theta over")
-    assert "theta moved: the encoders are in each other's place" in finding.observed
+    assert (finding.good, finding.fix) == (False, "swap the plugs of psi and theta")
+    assert "theta moved: their encoders are swapped" in finding.observed
     assert found(checkup, "the drive").good is None  # never switched on
 
 

@@ -93,10 +93,10 @@ def test_a_hand_moves_a_cart_by_ten_centimetres_and_a_pendulum_by_a_turn():
     [
         (-10, 1, {"x": -100}, "counts the wrong way, swap its channels"),
         (-10, -1, {"x": 100}, "showed 100 mm"),
-        (5, 1, {"x": 50}, "0.5 times what it was asked for: wrong counts per metre"),
-        (-5, 1, {"x": -50}, "0.5 times what it was asked for, and counts the wrong way: wrong counts per metre"),
-        (40, 1, {"x": 400}, "4 times what it was asked for: wrong counts"),
-        (13, 1, {}, "1.3 times what it was asked for: wrong counts"),
+        (5, 1, {"x": 50}, "0.5 times the motion requested: wrong counts per metre"),
+        (-5, 1, {"x": -50}, "0.5 times the motion requested, and counts the wrong way: wrong counts per metre"),
+        (40, 1, {"x": 400}, "4 times the motion requested: wrong counts"),
+        (13, 1, {}, "1.3 times the motion requested: wrong counts"),
         (0, 1, {}, "showed 0 mm: not connected, or not this channel"),
     ],
 )
@@ -118,7 +118,7 @@ def test_counts_that_come_at_another_s_place_are_told_as_plugs():
     """The cart's ten counts come where the pendulum's belong."""
     walk, _, _ = steps(((0, 0), NOTHING), ((0, 10), NOTHING))
     first = next(walk.by_hand())
-    assert (first.good, first.fix) == (False, "change the plugs of x and theta over")
+    assert (first.good, first.fix) == (False, "swap the plugs of x and theta")
     assert "theta moved" in first.observed
 
 
@@ -229,7 +229,9 @@ def test_a_drive_is_told_by_what_it_moves():
     one_way, _ = told(lambda u: (abs(u), abs(u)))
     assert one_way[-1].what == "the drive, backward"
     assert (one_way[-1].good, "one way only" in one_way[-1].observed) == (False, True)
-    dead = [told(lambda u: (0.0, 0.0), hand)[0][0] for hand in (lambda _: True, lambda t: "Has the bridge" not in t)]
+    dead = [
+        told(lambda u: (0.0, 0.0), hand)[0][0] for hand in (lambda _: True, lambda t: "Does the bridge have" not in t)
+    ]
     assert ["enable line" in f.observed for f in dead] == [True, False]
     assert "the bridge has no supply" in dead[1].observed
     _, beside = told(lambda u: (0.0, 0.0))
@@ -290,7 +292,7 @@ def test_a_pressed_button_takes_the_motor_s_power():
     (good,), pulses = pressed(0.03)  # three counts are still
     assert (good.good, pulses) == (True, [0.8])
     (bad,), _ = pressed(-0.04)
-    assert (bad.good, "moved although it is pressed" in bad.observed) == (False, True)
+    assert (bad.good, "moved although the button is pressed" in bad.observed) == (False, True)
     (left,), pulses = pressed(0.0, hand=lambda _: False)
     assert (left.good, left.observed, pulses) == (None, "not pressed", [])
     assert pressed(0.0, hand=None)[0] == []
@@ -300,7 +302,11 @@ def test_a_pressed_button_takes_the_motor_s_power():
 
 @pytest.mark.parametrize(
     ("faults", "good", "said"),
-    [(Fault.OVERTRAVEL, True, "off beyond 200 mm"), (Fault.OVERSPEED, False, ""), (NOTHING, None, "it was not pushed")],
+    [
+        (Fault.OVERTRAVEL, True, "switched off beyond 200 mm"),
+        (Fault.OVERSPEED, False, ""),
+        (NOTHING, None, "it was not pushed"),
+    ],
 )
 def test_the_end_of_travel_is_waited_for(faults, good, said):
     walk, beside, _ = steps(((0, 0), NOTHING), ((0, 0), NOTHING), ((30, 0), faults))

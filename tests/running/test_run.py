@@ -334,7 +334,7 @@ def test_a_run_is_sound_with_a_whole_log_and_few_late_ticks(folder, tmp_path):
     missing = ended(dropped=1)
     assert not missing.complete
     assert not missing.sound
-    assert missing.verdict.endswith("The log is not whole: rows are missing.")
+    assert missing.verdict.endswith("The log is incomplete: rows are missing.")
     torn = replace(done, log=replace(done.log, complaint="its end is missing"))
     assert not torn.sound
     stopped = ended(stopped="The rig stopped.")
@@ -377,7 +377,7 @@ def test_the_rest_is_told_from_the_second_half_about_what_was_held_or_what_it_va
         ({"seconds": 86_401.0}, "got 86401 s"),
         ({"seconds": math.nan}, "got nan s"),
         ({"mode": "board"}, "--mode is host or mcu, got 'board'"),
-        ({"reference": "step 0.1"}, "a reference is for a law"),
+        ({"reference": "step 0.1"}, "a reference needs a law"),
         ({"excite": ""}, "either a law"),
         ({"law": "design.json"}, "either a law"),
     ],
@@ -418,7 +418,7 @@ def test_what_contradicts_itself_is_refused(folder, tmp_path):
 def test_a_start_beyond_the_window_of_a_run_is_refused_by_its_size(folder, tmp_path):
     """A run that holds a pendulum upright begins within 10 degrees of it: a person holds no more still."""
     late = RunRequest(rig=folder / "RIG.toml", law=folder / "design.json", seconds=0.5, tilt=math.radians(12))
-    with pytest.raises(BadInput, match=r"begins within 10 deg of it, and --start is 12 deg"):
+    with pytest.raises(BadInput, match=r"--start is 12 deg from 'inverted', and a run starts within 10 deg"):
         run_rig(late, tmp_path)
     assert run_rig(replace(late, tilt=math.radians(9.9)), tmp_path).end.ticks > 0
 

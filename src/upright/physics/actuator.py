@@ -37,7 +37,7 @@ class DriveNumber(NamedTuple):
 ACTUATOR = {
     "actuator.gain": DriveNumber("force per command", "force per unit of command", 1.0),
     "actuator.offset": DriveNumber("command", "added to the command", 0.0),
-    "actuator.limit": DriveNumber("command", "largest command that passes", math.inf, True),
+    "actuator.limit": DriveNumber("command", "command limit", math.inf, True),
     "actuator.lag": DriveNumber("time", "first-order lag", 0.0, True),
     "actuator.delay": DriveNumber("time", "dead time", 0.0, True),
     "actuator.slope": DriveNumber("force per speed", "force lost per speed (back-EMF)", 0.0),

@@ -98,7 +98,7 @@ class RunningLaw:
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
     """Why no rig may be given these gains, as a clause; empty when it may.
 
-    Gains with which one count moves the command by all that it may be, at once or through the law's memories, or held
+    Gains with which one count moves the command by its whole limit, at once or through the law's memories, or held
     for `STEP_SAMPLES`, amplify nothing but rounding. A law that grows by itself, faster than `GROWTH` a sample, runs
     away while its command is limited. The firmware computes the same.
     """
@@ -116,15 +116,14 @@ def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
                 later = f" {k} sample{'s' * (k > 1)} later" if k else ""
                 return (
                     f"its gain on {name} is absurd: one count changes the command by {abs(u / per):.3g} "
-                    f"{about.command_unit}{later}, and {limits.command:g} {about.command_unit} is all that it may be"
+                    f"{about.command_unit}{later}, and its limit is {limits.command:g} {about.command_unit}"
                 )
     held = _step(law, len(about.coordinates))
     for name, u, per in zip(about.coordinates, held, about.counts, strict=True):
         if not abs(u / per) < limits.command:
             return (
                 f"its gain on {name} is absurd: one count that stays for {STEP_SAMPLES} samples changes the command by "
-                f"{abs(u / per):.3g} {about.command_unit}, and {limits.command:g} {about.command_unit} is all that it "
-                "may be"
+                f"{abs(u / per):.3g} {about.command_unit}, and its limit is {limits.command:g} {about.command_unit}"
             )
     return ""
 

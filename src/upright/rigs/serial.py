@@ -26,12 +26,12 @@ _REFUSAL_OF_VERSION_1 = 4  # bytes of it, where a body stands now
 _BOOT = 4.0  # s; a board that resets when its port is opened waits for its boot loader
 
 _WHY = {
-    Result.WRONG_LENGTH: "the frame has not the length that it expects; is its firmware as old as this program?",
+    Result.WRONG_LENGTH: "a frame has the wrong length; is its firmware as old as this program?",
     Result.WRONG_MODE: "it is in the wrong mode for that",
     Result.WRONG_VALUE: "a value is beyond what it takes",
     Result.NOT_CONFIGURED: "it has no limits or no law yet; configure them first",
-    Result.FAULTED: "it stands in a fault that has to be cleared first",
-    Result.OFF_START: "it is off its start window",
+    Result.FAULTED: "it has a fault that must be cleared first",
+    Result.OFF_START: "it is outside its start window",
     Result.UNKNOWN: "it does not know that request; is its firmware as old as this program?",
     Result.WRONG_SESSION: "it was stopped, cleared or reset since it answered last, and has to be set up again",
 }
@@ -122,7 +122,7 @@ class SerialRig:
         """Find the firmware; a board that was switched on stands in FAULT with `Fault.RESET`."""
         if self._line is None:
             if self._open is None:
-                raise RigStopped("Its line was closed; make the rig anew with another line.")
+                raise RigStopped("Its line was closed; open the rig again on another line.")
             self._line = self._open()
         self._parser = wire.Parser()
         self._again = 0.3  # a board that resets when its port is opened hears nothing for a while
@@ -149,7 +149,7 @@ class SerialRig:
         greeting = wire.greeting(every, nonce := self._nonce())
         hello = self._hello = wire.hello(self._ask(Kind.HELLO, greeting, max(_BOOT, self._patience)))
         if hello.protocol == wire.PROTOCOL and hello.nonce != nonce:
-            raise RigStopped(f"{self._name()} answers another program; end that first.")
+            raise RigStopped(f"{self._name()} answers another program; stop that one first.")
         self._tick = 1e-6 * hello.period
         return hello
 
@@ -212,9 +212,8 @@ class SerialRig:
                 if self._status.result != Result.WRONG_VALUE:
                     raise
                 raise self._refusal(
-                    "the law's numbers are absurd: one count, or one that stays, may not move the command by all that "
-                    "it may be, its memory may not grow by itself, and none may reach 2^30 in counts and steps; look "
-                    "at gains and units"
+                    "the law's numbers are absurd; check gains and units: one count may not move the command by its "
+                    "whole limit, its memory may not grow by itself, and no number may reach 2^30 in counts and steps"
                 ) from None
             if held != body:
                 self._distrust("law", held.hex(), body.hex())

@@ -147,7 +147,7 @@ class Supervisor:
         self.about = self.rig.open()
         if self.duty.limits is None:
             self._give_up(
-                NO_FAULT, f"{self.about.name} has no limits, and nothing is armed without: write [limits] with "
+                NO_FAULT, f"{self.about.name} has no limits, and is not armed without them: write [limits] with "
                 f"command, and [limits.{self.about.coordinates[0]}] with travel, speed and start into its RIG.toml.",
             )  # fmt: skip
         requested = self.duty.limits
@@ -300,9 +300,9 @@ class Supervisor:
         before, self._last, self._first, self._stale = self._last or tick, tick, self._first or tick, 0
         if self.clock is not None and (longer := self._ticking.sees(tick.time, self.clock())) != 1.0:
             self._give_up(
-                Fault.MODEL, f"{self.about.name} is not timed as it says: its tick lasts {longer:.3g} times "
-                f"{1e3 * self.about.period:.4g} ms in the mean, by this computer's clock. Look at the board's clock "
-                "and prescaler.",
+                Fault.MODEL, f"{self.about.name} does not keep its period: on average its ticks lasted {longer:.3g} "
+                f"times {1e3 * self.about.period:.4g} ms by this computer's clock. Check the board's clock and "
+                "prescaler.",
             )  # fmt: skip
         self._look(self.readings(tick))
         if self._running is None:
@@ -383,8 +383,8 @@ class Supervisor:
                               f"stop within its travel of {most:.4g}.{self._likeliest}")  # fmt: skip
         if abs(readings[-1] - self.target[-1]) > self.duty.lean:
             self._give_up(
-                Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} left what is held by "
-                f"{self._shown(readings[-1] - self.target[-1])}, more than {self._shown(self.duty.lean)}: it fell."
+                Fault.OVERTRAVEL, f"{self.about.coordinates[-1]} is {self._shown(readings[-1] - self.target[-1])} from "
+                f"where it is to be stabilised, more than {self._shown(self.duty.lean)}: it fell."
                 f"{self._likeliest}",
             )  # fmt: skip
 
@@ -415,7 +415,9 @@ class Supervisor:
             self.rig.estop()
         if self._running is not None and not fault & UNSEEING and self._still_driven():
             fault |= Fault.MODEL
-            why += " It gains energy at zero command: if it moves on, the drive does not obey; hit the button."
+            why += (
+                " It gains energy at zero command: if it keeps moving, the drive does not obey; press the stop button."
+            )
         self.faults |= fault
         self.event(self._time, "fault", why)
         raise RigStopped(why)
@@ -492,8 +494,8 @@ class Supervisor:
         if largest < 1.0 + 1e-9:
             return ""
         return (
-            f"{self.about.name} is not started: under this law its model falls, e-fold in "
-            f"{model.period / math.log(largest):.3g} s; design again for it (upright design)."
+            f"{self.about.name} is not started: under this law its model falls, by a factor e every "
+            f"{model.period / math.log(largest):.3g} s. Design a law for this rig (upright design)."
         )
 
     def _shown(self, value: float) -> str:

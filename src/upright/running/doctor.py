@@ -122,13 +122,13 @@ def check_up(
     counts, written = dict(steps.counts), None
     lines = ", ".join(f"{name} = {value:.6g}" for name, value in counts.items())
     if counts and hand is not None and file.hardware and hand(
-        f"Shall {path} take the counts that were seen, {lines}? No, if you rather swap channels."
+        f"Write the measured counts into {path}: {lines}? Answer no if you prefer to swap channels."
     ):  # fmt: skip
         written = file.with_counts(counts)
     (lost, error), unit = steps.lost, model.unit
     if lost and hand is not None and file.hardware and hand(
-        f"Shall {path} take the drive's dead zone, {lost:.3g} {unit} (standard error {error:.2g} {unit})? A law that "
-        "knows it makes up for it."
+        f"Write the drive's dead zone into {path}: {lost:.3g} {unit} (standard error {error:.2g} {unit})? Laws then "
+        "compensate for it."
     ):  # fmt: skip
         written = file.with_dead_zone(f"{lost:.3g} {unit}")
     return Checkup(

@@ -133,12 +133,12 @@ class FirstPowerUp:
         if others:
             return CheckupFinding(
                 what=what, good=False,
-                observed=f"showed {shown}, and {' and '.join(others)} moved: the encoders are in each other's place",
-                fix=f"change the plugs of {name} and {others[0]} over",
+                observed=f"showed {shown}, and {' and '.join(others)} moved: their encoders are swapped",
+                fix=f"swap the plugs of {name} and {others[0]}",
             )  # fmt: skip
         return CheckupFinding(
             what=what, good=False, observed=f"showed {shown}: not connected, or not this channel",
-            fix=f"look at the encoder of {name}: its supply, its ground, both channels, and their pins",
+            fix=f"check the encoder of {name}: its supply, its ground, both channels, and their pins",
         )  # fmt: skip
 
     def _judged(self, i: int, what: str, shown: str, ratio: float) -> CheckupFinding:
@@ -161,7 +161,7 @@ class FirstPowerUp:
         turned = ", and counts the wrong way" if ratio < 0 else ""
         return CheckupFinding(
             what=what, good=False,
-            observed=f"showed {shown}, {abs(ratio):.2g} times what it was asked for{turned}: wrong counts per {unit}",
+            observed=f"showed {shown}, {abs(ratio):.2g} times the motion requested{turned}: wrong counts per {unit}",
             fix=f"it has {'' if likely else 'about '}{counts:.6g} counts per {unit} and not {described:.6g}; correct "
             "them (four times the lines of an encoder)",
         )  # fmt: skip
@@ -221,7 +221,8 @@ class FirstPowerUp:
         below, first, moved = self._first_move(-1.0)
         if not first or moved[self.driven] > 0:
             yield CheckupFinding(
-                what="the drive, backward", good=False, fix="look at the line for the other side: PWM B, or the sign",
+                what="the drive, backward", good=False,
+                fix="check the line for the other direction: PWM B, or the sign",
                 observed="it does not move backwards: the drive pushes one way only",
             )  # fmt: skip
             return
@@ -276,16 +277,16 @@ class FirstPowerUp:
         most = f"not even {self.beside.held.command:.3g} {self.model.unit} moved {self._driven_name}"
         if self.hand is None:
             return CheckupFinding(what=what, observed=f"{most}: nothing drives it", good=False,
-                                  fix="look at supply, fuse, button, enable line and motor leads")  # fmt: skip
-        if self.hand("Has the bridge its supply: is its own lamp on, or does a meter show the volts?"):
+                                  fix="check supply, fuse, button, enable line and motor leads")  # fmt: skip
+        if self.hand("Does the bridge have its supply? Its own lamp is on, or a meter shows the voltage."):
             return CheckupFinding(
                 what=what, good=False,
                 observed=f"{most}, although the bridge has its supply: the enable line or the motor's leads are open",
-                fix="look at the enable line (does the board's lamp go on for a moment?), at the PWM lines and the "
+                fix="check the enable line (does the board's lamp go on for a moment?), at the PWM lines and the "
                 "motor's leads",
             )  # fmt: skip
         return CheckupFinding(what=what, observed=f"{most}: the bridge has no supply", good=False,
-                              fix="look at the supply, its fuse, and the button")  # fmt: skip
+                              fix="check the supply, its fuse, and the button")  # fmt: skip
 
     def _size(self, first: float) -> CheckupFinding:
         """How far the rig goes under a pulse that moves it plainly, beside its model."""
@@ -351,8 +352,8 @@ class FirstPowerUp:
         moved = abs(list(self.beside.pulse(height).moved.values())[self.driven])
         if moved * abs(self.beside.about.counts[self.driven]) > STILL:
             yield CheckupFinding(
-                what=what, observed="the motor moved although it is pressed", good=False,
-                fix="the button belongs into the motor's supply, between its plus and the bridge",
+                what=what, observed="the motor moved although the button is pressed", good=False,
+                fix="wire the button into the motor's supply, between its plus and the bridge",
             )  # fmt: skip
         else:
             yield CheckupFinding(what=what, observed="pressed, a pulse moves nothing")
@@ -381,10 +382,10 @@ class FirstPowerUp:
         while not tick.faults and tick.time - first.time < PATIENCE:
             tick = self.rig.exchange(0.0)
         if tick.faults & Fault.OVERTRAVEL:
-            yield CheckupFinding(what=what, observed=f"off beyond {far}")
+            yield CheckupFinding(what=what, observed=f"switched off beyond {far}")
         elif tick.faults:
             yield CheckupFinding(what=what, observed=fault_text(tick.faults), good=False,
-                                 fix="push slowly, and look at what it says")  # fmt: skip
+                                 fix="push slowly, and watch what it says")  # fmt: skip
         else:
             yield CheckupFinding(what=what, observed="it was not pushed that far", good=None)
         self.rig.stop()

@@ -141,8 +141,8 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         if abs(tilt) > duty.near:
             size, unit = (math.degrees(1.0), "deg") if last == "rad" else (1.0, last)
             raise BadInput(
-                f"a run at '{at}' begins within {size * duty.near:.3g} {unit} of it, and --start is {size * tilt:.3g} "
-                f"{unit}: start nearer."
+                f"--start is {size * tilt:.3g} {unit} from '{at}', and a run starts within "
+                f"{size * duty.near:.3g} {unit}; start closer."
             )
         away = np.zeros(2 * len(units))
         away[-2] = tilt
@@ -173,7 +173,7 @@ def read_law(path: Path, model: Rig, at: str, zero: str) -> tuple[Law | Rule, Ba
     try:
         content: Any = json.loads(read_text(path))
     except (ValueError, RecursionError):
-        raise BadInput(f"{path} is no JSON; name the design.json of `upright design`.") from None
+        raise BadInput(f"{path} is not JSON; name the design.json of `upright design`.") from None
     values = law_values(content)
     if values is None:
         raise BadInput(f"{path} holds no law that can run; design again: upright design FIT -o FOLDER.")

@@ -74,7 +74,7 @@ class RunRequest:
         if self.mode not in MODES:
             raise BadInput(f"--mode is host or mcu, got '{self.mode}'.")
         if self.reference and self.law is None:
-            raise BadInput("a reference is for a law; a signal that is put out blindly is --excite.")
+            raise BadInput("a reference needs a law to follow it; to send a signal without a law, use --excite.")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,7 +126,7 @@ class RigRun:
 
     @property
     def limit(self) -> float:
-        """Largest command that passes: of the drive, or as the supervisor limits it."""
+        """Command limit: of the drive, or as the supervisor limits it."""
         return min(self.model.saturation, math.inf if self.end.held is None else self.end.held.command)
 
     @property
@@ -189,7 +189,7 @@ class RigRun:
             return f"Stopped{ran}: {end.stopped}"
         how = f"{self.request.seconds:g} s, {end.ticks} ticks"
         late = f", {end.late} of them late" if end.late else ", none late"
-        log = "" if self.complete else f" The log is not whole: {end.log_message or 'rows are missing'}."
+        log = "" if self.complete else f" The log is incomplete: {end.log_message or 'rows are missing'}."
         if self.request.law is None:
             return f"The signal was put out for {how}{late}.{log}"
         last = self.model.plant.coordinates[-1]
@@ -287,8 +287,8 @@ def _check_accepted(request: RunRequest, basis: Basis) -> None:
     """Refuse to arm a law from a model that is not trusted, unless somebody says why it runs all the same."""
     if basis.level == NOT_TRUSTED and not (request.accept or "").strip():
         raise BadInput(
-            f"the law of {request.law} is not armed on hardware, for its model is not trusted: {basis.sentence} "
-            'Identify the rig until it is, or say why it runs all the same, which the log keeps: --accept "REASON".'
+            f"the law of {request.law} is not armed on hardware, because its model is not trusted: {basis.sentence} "
+            'Identify the rig again, or run it anyway with --accept "REASON", which the log keeps.'
         )
 
 

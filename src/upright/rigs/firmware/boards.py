@@ -56,9 +56,7 @@ class BoardKind:
             When the board has no such drive.
         """
         if drive not in self.drives:
-            raise BadInput(
-                f"drives of the {self.title} are {', '.join(self.drives)}, got '{drive}'; {nearest(drive, self.drives)}"
-            )
+            raise BadInput(f"the {self.title} has no drive '{drive}'; choose with --drive: {', '.join(self.drives)}")
         return f"{self.name}-{drive}.{self.suffix}"
 
 

@@ -69,7 +69,7 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
         limit = {"value": with_unit(most, unit, 12), "assumed": True}
         actuator.key("limit", limit, "the command is cut off there; MEASURE")
     else:
-        actuator.key("limit", with_unit(most, unit), "MEASURE: largest command that passes; the largest here", off=True)
+        actuator.key("limit", with_unit(most, unit), "MEASURE: command limit; the largest here", off=True)
 
 
 def is_cut_off(command: Array, share: float) -> bool:
