@@ -64,7 +64,7 @@ WRONG = [
     ('column = "theta"', "column = 3", 12, "got 3"),
     ('unit = "counts"', 'unit = "count5"', 13, "did you mean"),
     ('unit = "counts"\ncounts_per_rev = 14400', 'unit = "counts"', 12, "theta needs counts_per_rev"),
-    ('unit = "counts"\ncounts_per_rev = 14400', 'unit = "V"', 12, 'needs scale = "... rad/V"'),
+    ('unit = "counts"\ncounts_per_rev = 14400', 'unit = "V"', 12, 'or give scale = "... rad/V"'),
     ("counts_per_rev = 14400", "counts_per_turn = 14400", 14, "did you mean 'counts_per_rev'?"),
     ("counts_per_rev = 14400", "counts_per_rev = 0", 14, "above zero, got 0"),
     ("counts_per_rev = 14400", "counts_per_m = 14400", 14, "theta is in rad, so give counts_per_rev"),

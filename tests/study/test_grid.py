@@ -144,7 +144,7 @@ def test_a_line_has_si_per_unit_of_the_column_and_its_zero(keys, unit, x, line):
     [
         (THETA, "counts", r'theta needs counts_per_rev = \.\.\. or scale = "\.\.\. rad/counts"'),
         (X, "counts", r'x needs counts_per_m = \.\.\. or scale = "\.\.\. m/counts"'),
-        (X, "V", r'x needs scale = "\.\.\. m/V"'),
+        (X, "V", r'or give scale = "\.\.\. m/V"'),
     ],
 )
 def test_a_column_of_another_kind_needs_a_scale(coordinate, unit, ways):

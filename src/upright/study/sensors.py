@@ -67,9 +67,12 @@ class Sensor:
         if units.same_dimension(unit, "counts") and self.per_count:
             return self.per_count * (1.0 if self.scale is None else self.scale)
         if self.scale is None:
-            counts = f"counts_per_{'rev' if needed == 'rad' else 'm'} = ... or "
-            ways = f'{counts if units.same_dimension(unit, "counts") else ""}scale = "... {needed}/{unit}"'
-            raise BadInput(f"column '{self.column}' is in {unit}, so {self.coordinate.name} needs {ways}")
+            way = f'scale = "... {needed}/{unit}"'
+            if units.same_dimension(unit, "counts"):
+                ways = f"so {self.coordinate.name} needs counts_per_{'rev' if needed == 'rad' else 'm'} = ... or {way}"
+            else:
+                ways = f"but {self.coordinate.name} is in {needed}: correct the unit, or give {way}"
+            raise BadInput(f"column '{self.column}' is in {unit}, {ways}")
         return self.scale
 
     def line(self, record: Record) -> tuple[float, float]:
