@@ -142,13 +142,13 @@ def test_a_line_has_si_per_unit_of_the_column_and_its_zero(keys, unit, x, line):
 @pytest.mark.parametrize(
     ("coordinate", "unit", "ways"),
     [
-        (THETA, "counts", r'theta needs counts_per_rev = \.\.\. or scale = "\.\.\. rad/counts"'),
-        (X, "counts", r'x needs counts_per_m = \.\.\. or scale = "\.\.\. m/counts"'),
-        (X, "V", r'or give scale = "\.\.\. m/V"'),
+        (THETA, "counts", r'so theta needs counts_per_rev = \.\.\. or scale = "\.\.\. rad/counts"'),
+        (X, "counts", r'so x needs counts_per_m = \.\.\. or scale = "\.\.\. m/counts"'),
+        (X, "V", r'but x is in m: correct the unit, or give scale = "\.\.\. m/V"'),
     ],
 )
 def test_a_column_of_another_kind_needs_a_scale(coordinate, unit, ways):
-    with pytest.raises(BadInput, match=rf"column 'c' is in {unit}, so {ways}"):
+    with pytest.raises(BadInput, match=rf"column 'c' is in {unit}, {ways}"):
         Sensor(coordinate=coordinate, column="c").line(log([0, 1], unit))
 
 
