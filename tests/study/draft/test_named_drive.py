@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -34,6 +36,16 @@ def test_a_driven_record_is_fitted_whole(noise, dt):
     (run,) = study.runs
     assert run.t.size >= 0.99 * round(SECONDS / dt)  # it moves from the first sample on, and still at the end
     assert run.u.any()
+
+
+def test_init_takes_a_column_with_the_name_of_the_torque_for_the_drive(tmp_path):
+    """As a twin's own table is saved; without its drive the log would be cut to the swing after the last push."""
+    log = tmp_path / "log.csv"
+    driven(2e-2, 1e-3).rename(columns={"angle": "theta", "shaft": "T"}).to_csv(log, index=False)
+    study = tomllib.loads(up.init(log, plant="pendulum", out=tmp_path / "study.toml").value)
+    assert study["drive"]["column"] == "T"
+    (run,) = study["runs"]
+    assert run["window"][1] - run["window"][0] >= 0.99 * SECONDS - 1
 
 
 def test_a_torque_that_is_named_weighs_the_pendulum_and_predicts_it():

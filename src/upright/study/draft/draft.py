@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from upright.errors import BadInput
+from upright.physics import find
 from upright.readers import inspect
 from upright.readers.inspection import Inspection
 from upright.records import Record
@@ -72,6 +73,9 @@ def _drafted(
 ) -> tuple[Recognised, list[TomlTable]]:
     """What was recognised, as this plant or what the columns suggest, and the tables of its study."""
     recognised = recognise(record, inspection, plant)
+    force = [i.name for i in find(recognised.plant).inputs if i.name in record.signals and record[i.name].any()]
+    if force and recognised.drive is None and not record.inputs:  # a column bears its name
+        return _drafted(record.replace(inputs=(force[0],)), inspection, log, study, plant)
     file = os.path.relpath(log.resolve(), study.resolve().parent).replace(os.sep, "/")
     if recognised.plant.startswith(CHAINS):
         where = "/".join(log.resolve().parts[-3:])

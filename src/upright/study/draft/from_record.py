@@ -91,15 +91,11 @@ def _renamed(record: Record, columns: Mapping[str, str], units: Mapping[str, str
 
 
 def _drafted(record: Record, name: str) -> tuple[dict[str, Any], type[Plant]]:
-    """Draft and plant. A drive that the record names, but not as one, is stated before its window is chosen."""
+    """Draft and plant."""
     from upright.physics import find
 
     study = tomllib.loads(draft(record, inspect(record), Path(LOG), Path("study.toml"), plant=name))
-    plant = find(study["rig"]["plant"])
-    named = [i.name for i in plant.inputs if i.name in record.signals and record[i.name].any()]
-    if "drive" in study or record.inputs or not named:
-        return study, plant
-    return _drafted(record.replace(inputs=(named[0],)), name)
+    return study, find(study["rig"]["plant"])
 
 
 def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
