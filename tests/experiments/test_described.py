@@ -116,7 +116,7 @@ def without(*lines: str) -> str:
         (("limit",), r"command limit \(--limit 10 or \[actuator\] limit"),
         (("servo_period",), r'servo period \(--period "2 ms" or \[rig\] servo_period = "2 ms"\)'),
         (("counts_per_rev",), r"encoder counts of theta \(--counts .* or \[sensors.theta\] counts_per_rev"),
-        (("limit", "counts_per_m"), r"largest command .*; encoder counts of x"),
+        (("limit", "counts_per_m"), r"command limit .*; encoder counts of x"),
     ],
 )
 def test_what_nobody_said_is_asked_for_by_option_and_key(tmp_path, lines, words):
@@ -191,7 +191,7 @@ def test_a_data_sheet_is_taken_by_name_and_told(tmp_path):
     np.testing.assert_allclose(rig.per_unit, (20_000, 4096 / math.tau))  # which the study says
     told = " ".join(done.chapter.warnings)
     assert "data sheet of the ECP 210" in told
-    assert "largest command" in told
+    assert "command limit" in told
     with pytest.raises(BadInput, match="there is no data sheet of 'ECP 21O'"):
         run(tmp_path / "rig.toml", tmp_path, vendor="ECP 21O")
 

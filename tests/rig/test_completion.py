@@ -48,7 +48,7 @@ def test_what_a_data_sheet_gives_is_told_and_not_said_of_the_rig():
     assert whole.name == made.name
     sheet, friction = doubts(OWN, whole)
     assert sheet.startswith("From the data sheet of the ECP 205, not specified for this rig: encoder counts of psi, ")
-    assert "largest command" not in sheet  # which is its own
+    assert "command limit" not in sheet  # which is its own
     assert friction == f"The fit knows no dry friction; simulations have that of the {made.name} as designed."
 
 

@@ -306,7 +306,7 @@ def test_a_board_that_holds_something_else_than_it_was_given_is_stopped(kind):
         (Result.WRONG_LENGTH, "is its firmware as old as this program"),
         (Result.WRONG_MODE, "wrong mode"),
         (Result.NOT_CONFIGURED, "configure them first"),
-        (Result.FAULTED, "has to be cleared first"),
+        (Result.FAULTED, "must be cleared first"),
         (Result.OFF_START, "bring it nearer to its zero"),
     ],
 )
