@@ -197,7 +197,7 @@ def test_some_runs_are_held_out_and_never_all():
         ("ladder = 3\n" + TWO, "a ladder is a list of rungs"),
         (TWO + '[[ladder]]\nname = "x"\nadds = ["zeta"]\n', "adds lists"),
         (TWO + '[[ladder]]\nadds = ["b_2"]\n', "needs name as text"),
-        ("colour = 3\n" + TWO, "a study has no key 'colour'"),
+        ("colour = 3\n" + TWO, "there is no key 'colour'"),
     ],
 )
 def test_a_study_without_runs_or_with_other_keys_is_refused(text, sentence):

@@ -77,7 +77,7 @@ def test_values_come_in_the_form_asked_for():
         (lambda: A.whole("zero", 1, 4), "from 1 to 4, got 0"),
         (lambda: A.whole("flag", 1, 4), "from 1 to 4, got true"),
         (lambda: A.check(("word",)), "line 4: [a] has no key 'blank'"),
-        (lambda: TEXT_OF.root().check(("a",)), "line 1: a study has no key 'title'"),
+        (lambda: TEXT_OF.root().check(("a",)), "line 1: there is no key 'title'"),
         (lambda: A.section("plain"), "must be a table of keys, got 3"),
     ],
 )  # fmt: skip

@@ -136,8 +136,8 @@ class Section:
         valid = tuple(valid)
         for key in self.values:
             if key not in valid:
-                place = f"[{self.name}]" if self.path else "a study"
-                raise self.error(key, f"{place} has no {what} '{key}'; {nearest(key, valid)}")
+                place = f"[{self.name}] has" if self.path else "there is"  # at the top of a study or of a RIG.toml
+                raise self.error(key, f"{place} no {what} '{key}'; {nearest(key, valid)}")
 
     def section(self, key: str) -> Section:
         """TomlTable under `key`, empty when absent."""
