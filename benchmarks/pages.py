@@ -99,6 +99,15 @@ def play(out: Path) -> Path:
     return out / "play.html"
 
 
+def motion(out: Path) -> Path:
+    """A loop that catches a pendulum, played."""
+    import upright as up
+
+    gains = up.place(arm().linear("inverted"), [-4 + 2j, -4 - 2j, -17, -3])
+    up.simulate(arm(), gains, start={"theta": "8 deg"}, seconds=3).play(out=out / "motion.html")
+    return out / "motion.html"
+
+
 def paper(out: Path) -> Path:
     import upright as up
 
@@ -120,6 +129,7 @@ PAGES: dict[str, Callable[[Path], Path]] = {
     "compare": compare,
     "log": _answer("show", "4/release_60.csv"),
     "play": play,
+    "motion": motion,
     "doctor": _answer("doctor", "2b/swing_up.csv"),
     "survey": _answer("survey", "examples/survey/synthetic_wide.csv"),
     "paper": paper,

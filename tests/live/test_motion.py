@@ -228,8 +228,11 @@ def test_what_cannot_be_played_is_a_sentence(record, rig, words):
 def test_a_run_that_was_only_measured_moves_alone(tmp_path):
     record = sixtieths(**SWUNG)
     record.play(ARM, out=tmp_path / "run.html")
-    with opened(tmp_path / "run.html") as (page, wrong):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    with opened(tmp_path / "run.html", width=360) as (page, wrong):
         until(page, "window.motion !== undefined")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert [v["id"] for v in axe.Axe().run(page).response["violations"]] == []
         assert page.locator("#rig g").count() == 1
         for k in (0, 60, 120):
             page.locator("#scrub").fill(str(k))
