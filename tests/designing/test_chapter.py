@@ -60,7 +60,7 @@ def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, 
     """Asked are 0.4 of distance, a third of gain, a period of delay and 99 % of the rigs."""
     told = with_margins(done, replace(FINE, **changes), chance=chance, peak_sampled=2.5)
     head = f"Stable, with reservations: {words}" if words else "Stable with margin"
-    assert told._loop_verdict() == f"{head}; recovering from this start takes 25 % of the drive's limit."
+    assert told._loop_verdict() == f"{head}; recovering from the default start takes 25 % of the drive's limit."
     page = chapter(told)
     assert page.sound == (not words)
     offered = any("--sampled" in step.command for step in page.steps)
@@ -69,7 +69,7 @@ def test_a_loop_stands_with_margin_or_with_what_it_lacks(done, changes, chance, 
 
 def test_a_start_beyond_the_limit_saturates_and_its_share_that_does_not_is_told(done):
     told = with_margins(done, FINE, peak_sampled=25.0)._loop_verdict()
-    assert "takes 25 V, 250 % of the limit, and saturates the drive; up to 40 % of this start it does not." in told
+    assert "takes 25 V, 250 % of the limit, and saturates the drive; a start up to 40 % as far does not." in told
     assert with_margins(done, FINE, peak_sampled=10.0)._loop_verdict().endswith("takes 100 % of the drive's limit.")
     free = with_margins(done, FINE, request=replace(done.request, limit=None))
     assert free._loop_verdict() == "Stable with margin."

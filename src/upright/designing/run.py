@@ -192,12 +192,13 @@ class Designed:
         if limit is None:
             return f"{head}."
         share = self.peak_sampled / limit
+        start = f"the {'default' if self.request.start is None else 'requested'} start"
         if share > 1:
             return (
-                f"{head}. Recovering from this start takes {self.peak_sampled:.3g} {unit}, {100 * share:.0f} % of the "
-                f"limit, and saturates the drive; up to {100 / share:.0f} % of this start it does not."
+                f"{head}. Recovering from {start} takes {self.peak_sampled:.3g} {unit}, {100 * share:.0f} % of the "
+                f"limit, and saturates the drive; a start up to {100 / share:.0f} % as far does not."
             )
-        return f"{head}; recovering from this start takes {100 * share:.0f} % of the drive's limit."
+        return f"{head}; recovering from {start} takes {100 * share:.0f} % of the drive's limit."
 
     def _reservations(self, m: Margins) -> list[str]:
         """What is thin about the loop, or too much about its command at rest."""
