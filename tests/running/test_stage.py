@@ -91,3 +91,18 @@ def test_a_small_pulse_is_given_unless_it_is_declined(tmp_path):
     assert given["a small pulse"] is True
     assert "a small pulse" not in declined
     assert declined["the drive"] is None  # not tried
+
+
+def test_what_the_file_states_stands_where_a_description_is_silent(tmp_path):
+    """The largest command that it allows is the largest there can be, and counts are counts."""
+    (tmp_path / "study.toml").write_text(STUDY.replace("counts_per_rev", "# counts_per_rev"), encoding="utf-8")
+    path = tmp_path / "RIG.toml"
+    path.write_text(
+        'kind = "serial"\nport = "COM1"\nstudy = "study.toml"\n[limits]\ncommand = 0.4\n'
+        "[counts]\npsi = -2400\ntheta = 4096\n",
+        encoding="utf-8",
+    )
+    model, _ = model_and_truth(read_rig_file(path))
+    assert model.limit == 0.4
+    assert model.counts == (2400, 4096)
+    assert model.hardware.entries["limit"].source == "stated in RIG.toml"

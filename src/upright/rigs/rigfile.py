@@ -158,6 +158,11 @@ class RigFile:
                 twist=section.positive("twist", first, usual.twist),
             )  # fmt: skip
 
+    def command(self, unit: str) -> float | None:
+        """Largest command that the file allows [its unit]; None where it says none."""
+        section = _root(self.path).section("limits")
+        return section.positive("command", unit, 1.0) if "command" in section else None
+
     def with_fit(self, fit: Path, path: Path) -> Path:
         """Write the same file with a fit for its description."""
         values = {k: v for k, v in _root(self.path).values.items() if k not in ("fit", "study", "record")}

@@ -20,6 +20,7 @@ from upright.realtime.session import Stage
 from upright.records import Array
 from upright.rig import Rig
 from upright.rig.completion import completed, twin_of
+from upright.rig.hardware import Entry, counts_unit
 from upright.rig.makes import make_named, make_rig
 from upright.rigs import Board, Limits, LiveRig, TwinPort
 from upright.rigs.driver import DRIVERS, Connection
@@ -38,13 +39,28 @@ def model_and_truth(file: RigFile) -> tuple[Rig, Rig]:
         model, truth = make_rig(make.key), make_rig(make.key, file.seed)
         return (replace(model, name=file.name), truth) if file.name else (model, truth)
     known = read_stored_rig(file.known, seed=file.seed)
-    model = _corrected(completed(known, vendor=file.vendor, who="a run on a rig", options=False), file)
+    stated = {} if file.vendor or known.hardware.vendor else _stated(file, known)
+    model = _corrected(completed(known, stated, vendor=file.vendor, who="a run on a rig", options=False), file)
     truth = model
     if file.performed == SIMULATED and file.make:
         truth = make_rig(make_named(file.make, option="make").key, file.seed)
     elif file.performed == SIMULATED and file.seed:
         truth = twin_of(model, file.seed)
     return (replace(model, name=file.name), truth) if file.name else (model, truth)
+
+
+def _stated(file: RigFile, known: Rig) -> dict[str, Entry]:
+    """What the file says of numbers that the description lacks: counts, and the largest command, which is a limit."""
+    here = f"stated in {file.path.name}"
+    units = {c.name: c.unit for c in known.plant.coordinates}
+    entries = {
+        f"counts.{name}": Entry(value=abs(n), unit=counts_unit(units[name]), source=here)
+        for name, n in file.counts.items()
+        if name in units
+    }
+    if (most := file.command(known.unit)) is not None:
+        entries["limit"] = Entry(value=most, unit=known.unit, source=here)
+    return {name: entry for name, entry in entries.items() if name not in known.hardware.entries}
 
 
 def _corrected(model: Rig, file: RigFile) -> Rig:

@@ -129,4 +129,5 @@ def rig_of_numbers(plant: Plant, name: str, values: Mapping[str, float], per: st
     force = force_unit(type(plant))
     unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
     sign, as_commanded = hardware.as_commanded()
+    name = name.rpartition(":")[2]  # the class of a plant in a file of the user's own
     return Rig(plant=plant, name=name, gain=sign * values.get(GAIN, 1.0), unit=unit, hardware=as_commanded)

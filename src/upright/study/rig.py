@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, fields
+from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput
@@ -29,6 +32,17 @@ def read_plant(study: Section) -> type[Plant]:
     with study.text.at(("rig", "plant")):
         before_running(name, study.text.path)
         return find(name, study.text.path.parent)
+
+
+def plant_seen_from(folder: Path, plant: str, before: Path) -> str:
+    """Name of a plant, the file of the user's own relative to a folder instead of to the one `before`."""
+    if ".py:" not in plant:
+        return plant
+    file, _, name = plant.rpartition(":")
+    there = (before / file).resolve()
+    with suppress(ValueError):  # on another drive
+        there = Path(os.path.relpath(there, folder.resolve()))
+    return f"{there.as_posix()}:{name}"
 
 
 def read_rig(study: Section, plant: type[Plant], drive_unit: str, fixed: Mapping[str, float] | None = None) -> GreyBox:

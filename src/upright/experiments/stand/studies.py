@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.files import read_text, replace_file
 from upright.quantities import with_unit
 from upright.rig.makes import make_of
+from upright.study.rig import plant_seen_from
 from upright.study.text import TomlTable, study_text, table
 
 Tables = dict[str, dict[str, Any]]
@@ -77,10 +77,8 @@ def _tables_of(stand: TestStand, folder: Path) -> Tables:
     if source is None:
         return _of_make(stand)
     tables: Tables = tomllib.loads(read_text(source))
-    plant = str(tables["rig"].get("plant", ""))
-    if ".py:" in plant:
-        file, _, name = plant.rpartition(":")
-        tables["rig"]["plant"] = f"{Path(os.path.relpath(source.parent / file, folder)).as_posix()}:{name}"
+    if "plant" in tables["rig"]:
+        tables["rig"]["plant"] = plant_seen_from(folder, str(tables["rig"]["plant"]), source.parent)
     return {k: tables[k] for k in ("rig", "parameters", "actuator") if k in tables}
 
 

@@ -51,12 +51,9 @@ def describe(tables: Sequence[TomlTable], record: Record, inspection: Inspection
     else:
         period = f"{record.period * 1e3:.4g} ms"
         rig.key("servo_period", {"value": period, "assumed": True}, "the log's; MEASURE if the controller is faster")
-    rig.key(
-        "travel",
-        _went(recognised, body, coordinates[body]),
-        "MEASURE: how far it may go; in this log it went this far",
-        off=True,
-    )
+    went = _went(recognised, body, coordinates[body])
+    here = "; in this log it went this far" if went[:1] != "." else ""
+    rig.key("travel", went, f"MEASURE: how far it may go{here}", off=True)
     actuator, drive = (
         next((t for t in tables if t.lines[0].startswith(f"[{n}]")), None) for n in ("actuator", "drive")
     )

@@ -25,7 +25,7 @@ from upright.signals.smoothing import acceleration_width, savitzky_golay, smooth
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised
+from upright.study.draft.recognise import Recognised, pushed_coordinate
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -239,7 +239,7 @@ def _drive(recognised: Recognised, plant: type[Plant], balanced: Balanced | None
     if recognised.drive is None or not plant.inputs:
         return [no_drive_table()] if plant.inputs else []
     unit, scale = command_unit(recognised.drive)
-    force, driven = plant.inputs[0], next(iter(recognised.columns))
+    force, driven = plant.inputs[0], pushed_coordinate(recognised.plant, recognised.columns)
     guess = balanced.gain(recognised.plant) if balanced else _gain(recognised)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
     actuator = TomlTable("[actuator]")
@@ -256,7 +256,7 @@ def _drive(recognised: Recognised, plant: type[Plant], balanced: Balanced | None
 def _gain(recognised: Recognised) -> float:
     """Force per command of the right size: what the start inertia needs to swing as far as was seen."""
     assert recognised.drive is not None
-    c = next(iter(recognised.columns.values()))
+    c = recognised.columns[pushed_coordinate(recognised.plant, recognised.columns)]
     swing = (c.high - c.low) / 2 * {"counts": 4e-4, **ANGLES, **LENGTHS}.get(c.guess, 1.0)
     u = max(abs(recognised.drive.low), abs(recognised.drive.high)) or 1.0
     u *= command_unit(recognised.drive)[1]

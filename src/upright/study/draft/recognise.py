@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,6 +110,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
     }
     centre = rest[list(columns)[-1]]
     driven = record[next(iter(columns.values())).name]
+    pushed_column = record[columns[pushed_coordinate(plant, columns)].name]
     earlier: tuple[tuple[float, float], ...] = ()
     turned = ANGLES.get(columns[list(columns)[-1]].guess, 0.0)
     if drive is None and turned and list(columns)[-1] == "theta":
@@ -131,7 +133,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         columns=columns,
         rest=rest,
         drive=drive,
-        reversed=drive is not None and moves_against(record.t, record[drive.name], driven),
+        reversed=drive is not None and moves_against(record.t, record[drive.name], pushed_column),
         mirrored=mirrored,
         window=window,
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
@@ -139,6 +141,12 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         doubts=tuple(doubts),
         earlier=earlier,
     )
+
+
+def pushed_coordinate(plant: str, columns: Mapping[str, Column]) -> str:
+    """The coordinate on which the drive acts, the first where none of the columns is that one's."""
+    inputs = find(plant).inputs
+    return inputs[0].on if inputs and inputs[0].on in columns else next(iter(columns))
 
 
 def position_columns(record: Record, inspection: Inspection) -> list[Column]:
