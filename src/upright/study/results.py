@@ -21,7 +21,7 @@ from upright.identification.ladder.rungs import neutral
 from upright.physics.actuator import ACTUATOR
 from upright.rig.hardware import Hardware
 from upright.study.load import Study
-from upright.study.rig import plant_seen_from
+from upright.study.rig import plant_relative_to
 from upright.study.stored_fit import FORMAT
 from upright.study.text import StudyText
 
@@ -29,7 +29,7 @@ from upright.study.text import StudyText
 def write_fit(fit: Fit, study: Study, path: Path, crossed: CrossValidation | None = None) -> dict[str, Any]:
     """Write `fit.json` and return what it holds; see `fit_content`."""
     content = fit_content(fit, study, crossed)
-    content["plant"] = plant_seen_from(path.parent, study.plant, study.path.parent)
+    content["plant"] = plant_relative_to(path.parent, study.plant, study.path.parent)
     write_json(path, content)
     return content
 

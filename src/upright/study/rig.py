@@ -34,7 +34,7 @@ def read_plant(study: Section) -> type[Plant]:
         return find(name, study.text.path.parent)
 
 
-def plant_seen_from(folder: Path, plant: str, before: Path) -> str:
+def plant_relative_to(folder: Path, plant: str, before: Path) -> str:
     """Name of a plant, the file of the user's own relative to a folder instead of to the one `before`."""
     if ".py:" not in plant:
         return plant

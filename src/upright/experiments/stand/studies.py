@@ -13,7 +13,7 @@ from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.files import read_text, replace_file
 from upright.quantities import with_unit
 from upright.rig.makes import make_of
-from upright.study.rig import plant_seen_from
+from upright.study.rig import plant_relative_to
 from upright.study.text import TomlTable, study_text, table
 
 Tables = dict[str, dict[str, Any]]
@@ -78,7 +78,7 @@ def _tables_of(stand: TestStand, folder: Path) -> Tables:
         return _of_make(stand)
     tables: Tables = tomllib.loads(read_text(source))
     if "plant" in tables["rig"]:
-        tables["rig"]["plant"] = plant_seen_from(folder, str(tables["rig"]["plant"]), source.parent)
+        tables["rig"]["plant"] = plant_relative_to(folder, str(tables["rig"]["plant"]), source.parent)
     return {k: tables[k] for k in ("rig", "parameters", "actuator") if k in tables}
 
 
