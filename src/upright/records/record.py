@@ -144,8 +144,8 @@ class Record(Shown):
     def __dir__(self) -> list[str]:
         forms = [f"{way}_{form}" for way in ("from", "to") for form in _FORMS]
         return [
-            "animate", "inputs", "names", "outputs", "period", "plant", "play", "plot", "provenance", "replace",
-            "signals", "t", "u", "units", "window", "y", *forms,
+            "inputs", "names", "outputs", "period", "play", "plot", "provenance", "replace", "signals", "t", "u",
+            "units", "window", "y", *forms,
         ]  # fmt: skip
 
     def __len__(self) -> int:
