@@ -466,7 +466,7 @@ def test_what_dir_shows_of_a_design_is_there(design):
 
 
 def test_methods_of_a_fit_name_arguments_where_the_command_line_names_options(fit):
-    with pytest.raises(up.BadInput, match="largest command") as missing:
+    with pytest.raises(up.BadInput, match="command limit") as missing:
         fit.play()
     assert "limit=10" in str(missing.value)
     assert "--" not in str(missing.value)
