@@ -31,7 +31,7 @@ class Maker:
     def __call__(self, sentence):
         self.said.append(sentence)
         hang = ("put 0 0 0 0", "release", "run 200")  # simavr shows no more than 80 edges in a millisecond
-        if "Shall" in sentence:
+        if sentence.startswith("Write the"):
             return self._agrees
         if sentence.startswith("Does the bridge have"):
             return self._supplied
@@ -207,4 +207,4 @@ def test_who_does_not_agree_keeps_the_file(walked, tmp_path):
     checkup, maker = walked("flip 0", agrees=False)
     assert checkup.written is None
     assert (tmp_path / "RIG.toml").read_text(encoding="utf-8").count("[counts]") == 0
-    assert "Shall" in maker.said[-1]
+    assert "Write the" in maker.said[-1]
