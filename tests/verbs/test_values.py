@@ -183,6 +183,7 @@ def test_an_answer_draws_its_first_picture_or_the_one_that_is_named():
     assert answer.plot("kept")._repr_svg_() == "<svg/>"
     with pytest.raises(BadInput, match="there is no picture of 'T'"):
         Answer(1, Chapter(title="T", verdict="")).plot()
+    assert Answer(1, Chapter(title="T", verdict="It holds.")).verdict == "It holds."
     with pytest.raises(BadInput, match=r"ending in \.html or \.pdf, got 'page\.txt'"):
         answer.report("page.txt")
     with pytest.raises(AttributeError):

@@ -5,6 +5,9 @@ from __future__ import annotations
 import importlib.util
 import sys
 import traceback
+from collections.abc import Generator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from upright.declared import Declared
@@ -61,6 +64,19 @@ _ALIASES = {
 } | {f"chain-{n}": f"rectilinear-{n}" for n in (1, 2, 3)}
 
 
+_IN_MEMORY: ContextVar[type[Plant] | None] = ContextVar("in_memory", default=None)
+
+
+@contextmanager
+def called_by_its_name(plant: type[Plant]) -> Generator[str]:
+    """The name by which `find` gives a class that stands in no file, while this lasts."""
+    before = _IN_MEMORY.set(plant)
+    try:
+        yield plant.__name__
+    finally:
+        _IN_MEMORY.reset(before)
+
+
 def find(name: str, folder: Path | None = None) -> type[Plant]:
     """Plant class by name.
 
@@ -77,6 +93,9 @@ def find(name: str, folder: Path | None = None) -> type[Plant]:
     BadInput
         When there is no such plant, file or class.
     """
+    own = _IN_MEMORY.get()
+    if own is not None and name == own.__name__:
+        return own
     if ".py:" in name:
         file, _, class_name = name.rpartition(":")
         return _from_file((folder or Path()) / file, class_name)

@@ -197,8 +197,8 @@ def read_fit(path: Path) -> StoredFit:
         raise BadInput(f"{path}: {str(error).rstrip('.')}; identify again, or put it right") from None
 
 
-def stored_fit(content: dict[str, Any]) -> StoredFit:
-    """Model of what a `fit.json` holds; see `read_fit`."""
+def stored_fit(content: dict[str, Any], in_memory: type[Plant] | None = None) -> StoredFit:
+    """Model of what a `fit.json` holds, of a plant that may be in no file; see `read_fit`."""
     plant, verdict = (_text(content.get(key, ""), key) for key in ("plant", "verdict"))
     if not plant:
         raise BadInput("plant must be a name, got an empty one")
@@ -206,7 +206,7 @@ def stored_fit(content: dict[str, Any]) -> StoredFit:
     values = {name: _value(name, entry) for name, entry in entries.items()}
     if not values:
         raise BadInput("it holds no parameters")
-    _check_physics(plant, values)
+    _check_physics(plant, values, in_memory)
     substeps = content.get("substeps", 1)
     if isinstance(substeps, bool) or not isinstance(substeps, int) or not 1 <= substeps <= SUBSTEPS:
         raise BadInput(f"substeps must be a whole number from 1 to {SUBSTEPS}, got {_shown(substeps)}")
@@ -221,7 +221,7 @@ def stored_fit(content: dict[str, Any]) -> StoredFit:
     return StoredFit(
         plant=plant, values=values, substeps=substeps, verdict=verdict, trusted=trusted, groups=groups, content=content,
         basis=_basis(content, verdict, trusted=trusted), hardware=_hardware(content, values),
-        bands=None if content.get("bands") is None else _bands(content["bands"]),
+        bands=None if content.get("bands") is None else _bands(content["bands"]), in_memory=in_memory,
     )  # fmt: skip
 
 
@@ -366,7 +366,7 @@ def _value(name: str, entry: Any) -> float:
     return _number(value, f"{place}.value")
 
 
-def _check_physics(plant: str, values: Mapping[str, float]) -> None:
+def _check_physics(plant: str, values: Mapping[str, float], in_memory: type[Plant] | None) -> None:
     """Refuse what the plant, where it is one of ours, and the drive cannot be; a user's plant checks itself."""
     for name, number in ACTUATOR.items():
         value = values.get(name, number.default)
@@ -374,13 +374,13 @@ def _check_physics(plant: str, values: Mapping[str, float]) -> None:
             raise BadInput(f"{name} ({number.meaning}) must be 0 or more, got {value:g}")
     if values.get("actuator.gain", 1.0) == 0:
         raise BadInput("actuator.gain must not be 0, since nothing would drive the rig then")
-    kind = find(plant) if ".py:" not in plant else None
+    kind = in_memory or (find(plant) if ".py:" not in plant else None)
     if kind is None:
         return
     for name in kind.names():
         if name in values:
             kind.quantity(name).check(name, values[name])
-    if plant in PLANTS and all(name in values for name in kind.names()):
+    if in_memory is None and plant in PLANTS and all(name in values for name in kind.names()):
         kind(**{name: values[name] for name in kind.names()})
 
 

@@ -53,6 +53,11 @@ class Answer(Generic[V]):
         return sorted(n for n in {*super().__dir__(), *dir(self.value)} - {"brief"} if not n.startswith("_"))
 
     @property
+    def verdict(self) -> str:
+        """What was learned, in a sentence or more."""
+        return str(getattr(self.value, "verdict", "") or self.chapter.verdict)
+
+    @property
     def numbers(self) -> Any:
         """Plain values for another program [SI]."""
         return self.chapter.numbers

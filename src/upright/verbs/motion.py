@@ -15,6 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
 from upright.records import Record
+from upright.verbs.answer import Answer
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
 from upright.verbs.linear.motion import check_bounded, motion_of_linear, read_gains, simulated_origin
@@ -40,7 +41,7 @@ def simulate(
     plant : Plant, Rig, fit, study, path of either, or linear model
         Of a rig or a fit its drive, encoders and servo period count as well, where they are known and not given here.
         A linear model in any form, ``(A, B)`` too, runs under gains, a deviation from the point that it holds about.
-    law : Gains, array of gains, Law or Rule, optional
+    law : Gains, array of gains, Law, Rule or what `design` answered, optional
         Gains act on readings sampled every `dt`, less the equilibrium, and on their differences; an array gives the
         plant's force, of a rig or a fit its command.
     start : mapping of state to number or text, or array, shape (states,), optional
@@ -72,6 +73,7 @@ def simulate(
     from upright.verbs.values import si
 
     on = known_options(MotionOptions, on, "simulate")
+    law = law.law if isinstance(law, Answer) else law
     limit, counts, memory, actuator = on.get("limit"), on.get("counts"), on.get("memory", 0.0), on.get("actuator")
     if is_linear(plant):
         others = {"at": at, "counts": counts, "memory": memory or None, "actuator": actuator}

@@ -5,9 +5,12 @@ A pendulum with a driven wheel at its end: a torque that speeds the wheel up thr
 
 from __future__ import annotations
 
+import sys
 import tomllib
+from types import ModuleType
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -95,6 +98,23 @@ def test_the_drive_s_sign_is_that_of_the_coordinate_on_which_it_acts(drafted, si
     study = tomllib.loads(drafted(800, sign).read_text(encoding="utf-8"))
     assert study["drive"].get("sign", 1) == sign
     assert {n: s["column"] for n, s in study["sensors"].items()} == {"theta": "pendulum", "phi": "wheel"}
+
+
+@pytest.mark.slow
+def test_a_class_that_stands_in_no_file_is_drafted_as_one_that_does(monkeypatch):
+    """From a data frame to a loop by objects alone; J is all that is known."""
+    typed = ModuleType("typed_at_a_prompt")
+    monkeypatch.setitem(sys.modules, typed.__name__, typed)
+    exec(PLANT, vars(typed))
+    rows = np.loadtxt(log(commands(1200)).splitlines(), delimiter=",", skiprows=1)
+    turns = rows[:, 1:3] * 2 * np.pi / list(COUNTS.values())
+    frame = pd.DataFrame({"t": rows[:, 0] / 1e3, "theta": turns[:, 0], "phi": turns[:, 1], "pwm": rows[:, 3]})
+    fit = up.identify(frame, typed.ReactionWheel, known={"J": J})
+    for name in ("J_w", "h", "actuator.gain"):
+        assert fit[name].value == pytest.approx(TRUE[name], rel=0.01)
+    designed = up.design(fit, at="inverted", limit=255)
+    held = up.simulate(fit, designed, start={"theta": "5 deg"}, seconds=5)
+    assert abs(held["theta"][-1] - np.pi) < np.radians(0.5)
 
 
 @pytest.mark.slow

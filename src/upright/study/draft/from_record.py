@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import nullcontext
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput, nearest
-from upright.physics import Plant, name_of
+from upright.physics import Plant, called_by_its_name, find, name_of
 from upright.physics.actuator import ACTUATOR
 from upright.readers import inspect
 from upright.records import Record
@@ -54,8 +55,7 @@ def study_of_record(
     """
     record = _renamed(record, columns or {}, units or {})
     rig, plant = (plant, type(plant.plant)) if isinstance(plant, Rig) else (None, plant)
-    name = name_of(plant) if plant is not None else ""
-    study, plant = _drafted(record, name) if plant is None or name else (_plain(record, plant), plant)
+    study, plant = _drafted(record, plant, {*(known or ()), *(ask or ())})
     values = study.setdefault("parameters", {})
     _own_force(study, plant, weighs=ask is None)
     given: dict[str, Number] = {}
@@ -90,16 +90,24 @@ def _renamed(record: Record, columns: Mapping[str, str], units: Mapping[str, str
     return record.replace(signals=signals, units=stated, **roles)
 
 
-def _drafted(record: Record, name: str) -> tuple[dict[str, Any], type[Plant]]:
-    """Draft and plant."""
-    from upright.physics import find
+def _drafted(record: Record, plant: type[Plant] | None, given: Set[str]) -> tuple[dict[str, Any], type[Plant]]:
+    """Draft and plant; of a plant in no file only where a number is left to guess."""
+    name = name_of(plant) if plant is not None else ""
+    if plant is not None and not name and _without_default(plant) <= given:
+        return _plain(record, plant), plant
+    with called_by_its_name(plant) if plant is not None and not name else nullcontext(name) as called:
+        study = tomllib.loads(draft(record, inspect(record), Path(LOG), Path("study.toml"), plant=called))
+        return study, find(study["rig"]["plant"])
 
-    study = tomllib.loads(draft(record, inspect(record), Path(LOG), Path("study.toml"), plant=name))
-    return study, find(study["rig"]["plant"])
+
+def _without_default(plant: type[Plant]) -> set[str]:
+    """Numbers that a plant cannot do without."""
+    defaults = {f.name for f in fields(plant) if f.default is not MISSING}  # type: ignore[arg-type]
+    return set(plant.names()) - defaults
 
 
 def _plain(record: Record, plant: type[Plant]) -> dict[str, Any]:
-    """Study of a plant that no draft knows: columns bear the names of its coordinates and inputs."""
+    """Study of a plant whose numbers are all given: columns bear the names of its coordinates and inputs."""
     study: dict[str, Any] = {"rig": {"plant": plant.__name__}, "parameters": {}, "sensors": {}}
     for c in plant.coordinates:
         if c.name in record.signals:
@@ -174,8 +182,7 @@ def _answer(
     for name, start in starts.items():
         where, key = table(name)
         where[key] = {"guess": _text(start, plant, name)}
-    defaults = {f.name for f in fields(plant) if f.default is not MISSING}  # type: ignore[arg-type]
-    missing = [n for n in plant.names() if n not in values and n not in defaults]
+    missing = [n for n in plant.names() if n not in values and n in _without_default(plant)]
     if missing:
         raise BadInput(
             f"{plant.__name__} needs {', '.join(missing)}, neither known nor estimated; measure and pass"

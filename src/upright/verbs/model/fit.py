@@ -156,8 +156,7 @@ class FitAnswer(Answer["Fit"]):
         from upright.study.results import fit_content
         from upright.study.stored_fit import stored_fit
 
-        stored = stored_fit(fit_content(self.value, self.study, self.crossed))
-        return replace(stored, in_memory=self.value.model.plant)
+        return stored_fit(fit_content(self.value, self.study, self.crossed), self.value.model.plant)
 
     @property
     def plant(self) -> Plant:
