@@ -121,3 +121,11 @@ def test_without_a_limit_nothing_is_loud():
 def test_a_rest_without_commands_times_or_limit_is_refused(u, limit):
     with pytest.raises(BadInput, match="limit above 0"):
         rest_effort(T[:1] if u.size == 1 else T, u, limit)
+
+
+@pytest.mark.parametrize(("times", "repeats"), [(3, True), (2, False)])
+def test_what_turns_three_times_repeats_and_what_turns_twice_does_not(times, repeats):
+    t = np.linspace(0.0, times, 200 * times, endpoint=False)
+    found = cycle(t, -np.cos(2 * math.pi * t))
+    assert (found is not None) is repeats
+    assert found is None or found.period == pytest.approx(1.0, rel=0.01)  # two samples of 200

@@ -11,6 +11,7 @@ import pytest
 from upright.readers.inspection import inspect_record
 from upright.readers.resolution import (
     Resolution,
+    _levels,
     counts_per_rev,
     decimal_step,
     is_epoch,
@@ -188,3 +189,8 @@ def test_a_clock_that_reads_more_than_eleven_days_counts_from_an_epoch():
     assert not is_epoch(np.array([11.5 * 86400]))
     assert is_epoch(np.array([11.6 * 86400]))
     assert not is_epoch(np.zeros(0))
+
+
+@pytest.mark.parametrize(("digits_apart", "levels"), [(2, 100), (1, 1)])
+def test_levels_two_digits_of_a_text_apart_are_levels_and_one_digit_apart_they_are_one(digits_apart, levels):
+    assert _levels(np.round(0.001 * digits_apart * np.arange(100), 3), 0.001).size == levels

@@ -92,3 +92,9 @@ def test_a_run_on_a_board_with_a_slow_tick_is_stopped_with_its_length():
     with pytest.raises(RigStopped, match=r"on average its ticks lasted 2 times 0\.884 ms by this computer's clock"):
         scene.run(1.0)
     assert scene.told[-1] == ("fault", 0.0, False)
+
+
+def test_nothing_is_told_of_clocks_that_were_compared_for_less_than_half_a_second():
+    """However long the host has been up: its clock stands at an hour when the board's first sample comes."""
+    ticking = TickLength()
+    assert [ticking.sees(k * 0.05, 3600 + k * 0.1) for k in range(5)] == [1.0] * 5

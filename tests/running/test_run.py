@@ -453,3 +453,17 @@ def test_a_run_is_played_as_its_encoders_saw_it_and_says_that_no_rig_moved(tmp_p
     assert again.page == played.page
     with pytest.raises(BadInput, match="nothing to play, since no loop began"):
         RunAnswer(replace(run.value, log=None), run.chapter).play()
+
+
+@pytest.mark.slow
+def test_a_rig_of_one_body_is_told_by_its_one_coordinate(tmp_path):
+    """The last coordinate is the first here: what a verdict names is that of the body that is held."""
+    (tmp_path / "study.toml").write_text(
+        '[rig]\nplant = "torsional-1"\nservo_period = "2 ms"\n[parameters]\nJ_1 = "0.01 kg m^2"\nk_1 = "1 N m/rad"\n'
+        'c_1 = 0.01\n[actuator]\ngain = "0.1 N m/V"\nlimit = "5 V"\n[sensors.theta_1]\ncounts_per_rev = 16000\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\nat = "rest"\n', encoding="utf-8")
+    up.design(tmp_path / "study.toml", at="rest", poles="-8+-6j", out=tmp_path)
+    done = up.run(tmp_path / "RIG.toml", law=tmp_path / "design.json", duration=0.3, out=tmp_path / "run")
+    assert "; theta_1 stayed within" in done.verdict

@@ -335,3 +335,11 @@ def test_a_stop_after_a_set_leaves_out_the_others_and_the_ways(tmp_path, monkeyp
     monkeypatch.setattr(regulation, "make_of_vendor", lambda vendor, plant: None)
     own = run_regulation(known, None, 0, tmp_path, stopped=lambda: True, request=replace(wish, push=0.2))
     assert own.task.start == (0.0, 0.0, math.radians(5), 0.2)  # of a rig that nobody makes
+
+
+def test_a_rig_of_nobody_s_make_is_let_go_at_five_degrees_without_a_push(tmp_path):
+    known = completed(fit_of(make_rig("linear"), spread=0.0))
+    own = replace(known, hardware=replace(known.hardware, vendor=None))
+    wish = RegulationRequest(poles={"set 2": RegulationRequest().poles["set 2"]}, draws=2, seconds=0.1)
+    done = run_regulation(own, None, 0, tmp_path, request=wish)
+    assert done.task.start == pytest.approx((0.0, 0.0, math.radians(5), 0.0))

@@ -20,6 +20,7 @@ from upright.identification.checks.outliers import (
     Outlier,
     ProvisionalFit,
     Stretches,
+    _compared,
     _spiky,
     _strange,
     _usual,
@@ -375,3 +376,12 @@ def test_spikes_that_nobody_named_stay():
     assert np.array_equal(without_outliers([spiked], [replace(named, run="another")])[0].y, y)
     (clean,) = without_outliers([spiked], [named])
     assert clean.y[[211, 500], 0] == pytest.approx(run.y[[211, 500], 0], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("interval", "words"), [((0.9, 1.2), "stays within its interval"), ((1.05, 1.2), "1 instead of 1.1 kg")]
+)
+def test_what_outliers_do_to_a_number_is_told_where_it_leaves_its_interval(interval, words):
+    before = SimpleNamespace(estimates={"m": SimpleNamespace(value=1.0)})
+    after = SimpleNamespace(estimates={"m": SimpleNamespace(value=1.1, unit="kg", interval=interval)})
+    assert words in _compared(before, after)

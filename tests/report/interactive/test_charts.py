@@ -111,3 +111,11 @@ def test_a_curve_is_drawn_through_as_few_of_its_points_as_an_eye_would_not_miss(
     assert _needed(x, 3.0 - 0.7 * x) == [0, 399]
     around = np.linspace(0.0, 2 * np.pi, 9)  # ends where it began
     assert _needed(10 * np.cos(around), 10 * np.sin(around)) == list(range(9))
+
+
+@pytest.mark.parametrize(("step", "multiples"), [(0.5, np.arange(-1.0, 3.1, 0.5)), (2.0, [0, 2])])
+def test_the_lines_of_an_axis_with_a_step_are_its_multiples_from_end_to_end(step, multiples):
+    """From the point at -1 to the crest of 3 sin t at 3, once for a desk and once for a phone."""
+    svg = chart(step=step, height=400.0).svg("a")
+    labels = re.findall(r'text-anchor="end"[^>]*>([−\-\d.]+)<', svg)
+    np.testing.assert_allclose([float(v.replace("−", "-")) for v in labels], np.tile(multiples, 2))

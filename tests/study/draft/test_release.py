@@ -10,7 +10,7 @@ import pytest
 from upright.physics import CartPendulum, Pendulum, find
 from upright.readers import read
 from upright.simulation import Held, simulate
-from upright.study.draft.release import free_from, free_stretches, free_swings
+from upright.study.draft.release import _reach, free_from, free_stretches, free_swings
 
 DT = 0.01
 PENDULUM = Pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3, b_2c=1e-3)
@@ -279,3 +279,10 @@ def test_carts_that_somebody_lets_go_by_hand_are_free_from_where_a_person_says_s
         carts = [record[name] for name in record.names if name.startswith("Encoder")]
         found = [start for start, _ in free_stretches(record.t, carts)]
         assert found == pytest.approx(begins, abs=0.1)  # a quarter of a period
+
+
+def test_a_ramp_is_gone_through_by_its_slope_within_every_window():
+    """One sample is a unit: within 21 samples 20 units, away from the ends, whose smoothing levels them."""
+    reach = _reach(np.arange(200.0), 21)
+    assert reach.shape == (180,)
+    np.testing.assert_allclose(reach[20:-20], 20.0, atol=1e-6)
