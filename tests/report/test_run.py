@@ -208,7 +208,10 @@ def test_a_log_is_a_record_with_the_applied_command_as_its_input(counts):
     assert ("theta_counts" in record.signals) == counts
     assert "t" not in record.signals
     assert record.units["theta"] == "rad"
-    assert record.provenance.notes == ("Torn.", "3 rows of the loop were dropped while it ran.")
+    dropped = "3 rows of the loop were dropped while it ran."
+    assert record.provenance.notes == ("Torn.", "This log was simulated; no rig was touched.", dropped)
+    real = log(header=replace(HEADER, rig="kind = 'serial'\n")).record()
+    assert real.provenance.notes == ()
     np.testing.assert_array_equal(record["theta"], THETA)
 
 

@@ -88,6 +88,23 @@ def test_numbers_of_a_rig_may_have_any_unit_of_their_kind():
     assert named.run.u == pytest.approx(plain.run.u, abs=1e-9)
 
 
+def test_a_design_is_tried_as_it_is_with_its_limit_and_only_at_its_period():
+    """Its velocities are filtered differences with a = 0.5, which those of gains are as well."""
+    designed = up.design(RIG, at="inverted")
+    assert designed.chosen.name == "filtered difference, a = 0.5"
+    of_gains = up.chance(RIG, designed.K[0], draws=4)
+    assert up.chance(RIG, designed, draws=4).run.u == pytest.approx(of_gains.run.u, abs=1e-9)
+    bare = up.Rig.known(ARM, gain="0.65 N m/V", period="2 ms", counts=4096)
+    limited = up.design(bare, at="inverted", limit="10 V")
+    assert up.chance(bare, limited, draws=4).run.u == pytest.approx(of_gains.run.u, abs=1e-9)
+    with pytest.raises(up.BadInput, match=r"for a period of 2 ms, and the rig's is 4 ms"):
+        up.chance(RIG, designed, period="4 ms")
+    with pytest.raises(up.BadInput, match="its own velocities; leave speed out"):
+        up.chance(RIG, designed, speed="plain")
+    with pytest.raises(up.BadInput, match="this design is for 'hanging'"):
+        up.chance(RIG, up.design(RIG, at="hanging"))
+
+
 def test_a_start_is_of_the_pendulum_unless_it_names_states():
     assert up.design(RIG, start="3 deg").value.request.start == pytest.approx((0, 0, math.pi / 60, 0))
     named = up.design(RIG, start="theta=3 deg, psi_dot=0.5 rad/s").value.request.start

@@ -212,8 +212,9 @@ class SerialRig:
                 if self._status.result != Result.WRONG_VALUE:
                     raise
                 raise self._refusal(
-                    "the law's numbers are absurd; check gains and units: one count may not move the command by its "
-                    "whole limit, its memory may not grow by itself, and no number may reach 2^30 in counts and steps"
+                    "the law's numbers are absurd; check gains and units: one count, or one that stays, may not move "
+                    "the command by its whole limit, its memory may not grow by itself, and no number may reach 2^30 "
+                    "in counts and steps"
                 ) from None
             if held != body:
                 self._distrust("law", held.hex(), body.hex())

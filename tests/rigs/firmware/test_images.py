@@ -123,5 +123,5 @@ def test_a_board_that_is_too_small_is_refused_with_the_reason(name):
 def test_a_board_or_a_drive_that_is_none_is_refused():
     with pytest.raises(BadInput, match="did you mean 'atmega2560'"):
         board_of("atmega256")
-    with pytest.raises(BadInput, match=r"analog, pair, sign, got 'pwm'"):
+    with pytest.raises(BadInput, match=r"no drive 'pwm'; choose with --drive: analog, pair, sign"):
         board_of("mega").image("pwm")

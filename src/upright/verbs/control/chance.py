@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Unpack
 
 from upright.errors import BadInput
@@ -17,6 +19,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from upright.control.preflight import Preflight
+    from upright.designing.run import Designed
+    from upright.laws import Law
+    from upright.rig import Rig
     from upright.verbs.forms import RigLike
     from upright.verbs.linear.feedback import Gains
     from upright.verbs.values import Workforce
@@ -29,8 +34,8 @@ UNSUPPORTED = (
 
 @renamed({**LET_GO, **CLUSTER})
 def chance(
-    fit: RigLike, gains: Gains | ArrayLike, *, seed: int = 0, workers: Workforce = 1, progress: Progress = silent,
-    **on: Unpack[TrialOptions],
+    fit: RigLike, gains: Gains | Answer[Designed] | ArrayLike, *, seed: int = 0, workers: Workforce = 1,
+    progress: Progress = silent, **on: Unpack[TrialOptions],
 ) -> Answer[Preflight]:  # fmt: skip
     """How likely gains are to hold the rig that a fit tells of, before anything moves.
 
@@ -41,9 +46,10 @@ def chance(
     ----------
     fit : answer of `identify` or `frequency`, or path of a fit.json
         Of a Furuta pendulum or a pendulum on a cart.
-    gains : Gains or array, shape (states,)
-        On the states about the inverted equilibrium, commands in the unit of the fit's drive; see `design`, or
-        multiply ``plant.linear("inverted").B`` by the gain of the drive.
+    gains : answer of `design`, Gains or array, shape (states,)
+        A design's law is tried as it is, and its limit is the drive's where the fit says none. Gains act on the states
+        about the inverted equilibrium, commands in the unit of the fit's drive: multiply
+        ``plant.linear("inverted").B`` by the gain of the drive.
     seed : int
         Of the rigs that are drawn.
     workers : int, str or executor
@@ -83,15 +89,21 @@ def chance(
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     shared = Workers.of(workers)
     known = rig_of(fit, "chance", seed=seed, draws=draws)
+    designed = gains.value if isinstance(gains, Answer) else None
+    if designed is not None and "limit" not in known.hardware.entries and designed.request.limit is not None:
+        on = {"limit": designed.request.limit, **on}
     entries = rig_entries(known.plant, known.unit, on)
     rig = completed(known, entries, vendor=on.get("vendor"), who="chance")
     make = make_of_vendor(rig.hardware.vendor, rig.plant)
     usual = make.start if make else START
     model = rig.linear("inverted")
-    refusal = f"chance takes gains, a number for each state, got {gains!r:.40}."
-    K = read_gains(gains, (1, len(model.states)), known.name, refusal)
     sampled = model.to_sampled(rig.period, rig.delay / rig.period)
-    law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.resolution), K)
+    if designed is None:
+        refusal = f"chance takes gains, a number for each state, got {gains!r:.40}."
+        K = read_gains(gains, (1, len(model.states)), known.name, refusal)
+        law = feedback(velocities(model, sampled, speed, memory, rig.limit, rig.resolution), K)
+    else:
+        law = _of_design(designed, rig, [n for n in ("speed", "memory") if n in on])
     let_go = dict(zip(("theta", "theta_dot"), usual, strict=True))
     let_go |= read_start(on.get("start"), ("theta", "theta_dot"), ("rad", "rad/s"))
     task = Task(start=(0.0, 0.0, *let_go.values()), hand=(0.0, 0.0, *HAND), seconds=seconds)
@@ -124,6 +136,20 @@ def chance(
                  "push": predicted.push, "noise": predicted.noise, "draws": draws, "seed": seed},
     )  # fmt: skip
     return Answer(predicted, resting_on(chapter, known.basis, SIMULATED))
+
+
+def _of_design(designed: Designed, rig: Rig, own: Sequence[str]) -> Law:
+    """The law of a design, which has to be for this rig as it runs."""
+    if own:
+        raise BadInput(f"a design has its own velocities; leave {' and '.join(own)} out, or hand over its gains.")
+    if designed.request.at != "inverted":
+        raise BadInput(f"chance tries what holds 'inverted', and this design is for '{designed.request.at}'.")
+    if not math.isclose(designed.request.period, rig.period, rel_tol=1e-9):
+        raise BadInput(
+            f"this design is for a period of {1e3 * designed.request.period:g} ms, and the rig's is "
+            f"{1e3 * rig.period:g} ms; design again, or pass period={designed.request.period:g}."
+        )
+    return replace(designed.law, target=0.0)  # a deviation from the equilibrium, as the trial has it
 
 
 def _effort(preflight: Preflight) -> str:
