@@ -173,7 +173,8 @@ def test_what_lies_at_a_limit_is_allowed(changes):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("{", "is not a fit.json; the first argument"),
+        ("[rig]", "is not a fit.json; the first argument"),
+        ('{\n  "plant": "furuta",\n  "param', "line 3: the file is cut off or damaged there"),
         ("[]", "lacks the keys plant, parameters of a fit.json"),
         ('{"plant": "furuta"}', "lacks the keys"),
         (json.dumps(FIT | {"format": 2}), "has format 2, this version reads 1; identify again"),

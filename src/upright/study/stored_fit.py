@@ -178,11 +178,17 @@ def read_fit(path: Path) -> StoredFit:
     BadInput
         When the file is no JSON, was not written by `upright identify`, or holds what no rig can have.
     """
+    text = ""
     try:
-        content: Any = json.loads(read_text(path))
+        text = read_text(path)
+        content: Any = json.loads(text)
     except BadInput:
         raise
-    except (UnicodeDecodeError, ValueError, RecursionError):
+    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+        if isinstance(error, json.JSONDecodeError) and text.startswith("{"):
+            raise BadInput(
+                f"{path}, line {error.lineno}: the file is cut off or damaged there; identify again, or take its copy"
+            ) from None
         raise BadInput(f"{path} is not a fit.json; the first argument is what `upright identify` wrote") from None
     wanted = ("plant", "parameters")
     if not isinstance(content, dict) or any(key not in content for key in wanted):
