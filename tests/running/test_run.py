@@ -25,7 +25,7 @@ from upright.rigs.rigfile import read_rig_file
 from upright.rigs.supervisor import BRAKING
 from upright.running import run as run_module
 from upright.running.chapter import run_chapter
-from upright.running.rig import excitation_law, model_and_truth, read_law, stage_of
+from upright.running.rig import about_what_is_held, excitation_law, model_and_truth, read_law, stage_of
 from upright.running.run import RunRequest, fresh, run_rig
 from upright.verbs.rig import RunAnswer
 
@@ -64,9 +64,9 @@ def test_a_design_of_before_and_of_now_holds_its_law(folder, tmp_path, key):
     law = json.loads((folder / "design.json").read_text(encoding="utf-8"))["law"]
     before = {"law": {"A": law["A"], "inputs": "readings, readings at rest, reference"}}
     (tmp_path / "design.json").write_text(json.dumps(before | {key: law}), encoding="utf-8")
-    read, basis = read_law(tmp_path / "design.json", RIG, "inverted", "hanging")
+    read, basis = read_law(tmp_path / "design.json")
     assert as_values(replace(read, target=0.0)) == law
-    assert np.asarray(read.target).tolist() == [0.0, math.pi]
+    assert np.asarray(about_what_is_held(read, RIG, "inverted", "hanging").target).tolist() == [0.0, math.pi]
     assert not basis.trusted
     assert "does not say whether it can be trusted" in basis.sentence
 
@@ -74,7 +74,7 @@ def test_a_design_of_before_and_of_now_holds_its_law(folder, tmp_path, key):
 def test_a_file_that_is_a_law_rests_on_no_model(folder, tmp_path):
     law = json.loads((folder / "design.json").read_text(encoding="utf-8"))["law"]
     (tmp_path / "law.json").write_text(json.dumps(law), encoding="utf-8")
-    _, basis = read_law(tmp_path / "law.json", RIG, "inverted", "hanging")
+    _, basis = read_law(tmp_path / "law.json")
     assert basis == DESCRIBED
 
 
@@ -388,6 +388,21 @@ def test_a_run_that_cannot_be_asked_is_refused(folder, how, words):
     assert RunRequest(rig=folder / "RIG.toml", samples=(0.0, 1.0)).law is None
     with pytest.raises(BadInput, match=words):
         RunRequest(**(asked | how))
+
+
+def test_a_law_that_is_none_is_told_before_what_the_rig_lacks(tmp_path):
+    """A person who mistyped it would else measure a limit first, and learn of the law then."""
+    study = (
+        '[rig]\nplant = "furuta"\n[parameters]\nm_p = "0.1 kg"\nl_cg = "0.2 m"\nr = "0.2 m"\nJ_d = 5e-3\nJ_p = 1e-3\n'
+    )
+    (tmp_path / "study.toml").write_text(study, encoding="utf-8")
+    (tmp_path / "RIG.toml").write_text('kind = "twin"\nstudy = "study.toml"\n', encoding="utf-8")
+    (tmp_path / "law.json").write_text("{}", encoding="utf-8")
+    request = RunRequest(rig=tmp_path / "RIG.toml", law=tmp_path / "law.json")
+    with pytest.raises(BadInput, match="holds no law that can run"):
+        run_rig(request, tmp_path)
+    with pytest.raises(BadInput, match="a run on a rig needs numbers"):
+        run_rig(replace(request, law=None, excite="free"), tmp_path)
 
 
 def test_a_twin_s_hand_brings_it_where_it_is_held_and_lets_go_with_the_tilt_asked(folder):

@@ -178,8 +178,8 @@ def _nothing() -> None:
     """What a person does."""
 
 
-def read_law(path: Path, model: Rig, at: str, zero: str) -> tuple[Law | Rule, Basis]:
-    """Law of a design.json, or of a file that `upright.laws.as_values` filled, about what is held; and its basis.
+def read_law(path: Path) -> tuple[Law | Rule, Basis]:
+    """Law of a design.json, or of a file that `upright.laws.as_values` filled, and its basis.
 
     Raises
     ------
@@ -195,11 +195,15 @@ def read_law(path: Path, model: Rig, at: str, zero: str) -> tuple[Law | Rule, Ba
         raise BadInput(f"{path} holds no law that can run; design again: upright design FIT -o FOLDER.")
     law = of_values(values)
     basis = DESCRIBED if values is content else of_plain(content.get("basis"), "this design")
+    return law, basis
+
+
+def about_what_is_held(law: Law | Rule, model: Rig, at: str, zero: str) -> Law | Rule:
+    """A law of deviations about an equilibrium, for encoders that are zeroed at another one."""
     if isinstance(law, Rule):
-        return law, basis
+        return law
     held, from_zero = model.plant.equilibrium(at), model.plant.equilibrium(zero)
-    target = np.array([held[c.name] - from_zero[c.name] for c in model.plant.coordinates])
-    return replace(law, target=target), basis
+    return replace(law, target=np.array([held[c.name] - from_zero[c.name] for c in model.plant.coordinates]))
 
 
 def law_values(content: Any) -> dict[str, Any] | None:

@@ -25,7 +25,15 @@ from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.protocol import Mode
 from upright.rigs.rigfile import RigFile, read_rig_file
-from upright.running.rig import excitation_law, model_and_truth, read_law, signal, stage_of, usual_limits
+from upright.running.rig import (
+    about_what_is_held,
+    excitation_law,
+    model_and_truth,
+    read_law,
+    signal,
+    stage_of,
+    usual_limits,
+)
 
 LEAST = 100
 """Fewest rows of which a last third tells anything."""
@@ -232,12 +240,13 @@ def run_rig(
     """
     library()  # what a log needs is missed before anything moves
     file = read_rig_file(request.rig)
+    read = None if request.law is None else read_law(request.law)  # before what the rig lacks
     model, _ = model_and_truth(file)
     balance, basis = request.law is not None, MEASURED if file.hardware and request.law is None else model.basis
     zero = file.zero if file.zero in model.plant.equilibria else next(iter(model.plant.equilibria))
     at = file.at if file.at in model.plant.equilibria else zero
-    if request.law is not None:
-        law, designed = read_law(request.law, model, at, zero)
+    if read is not None:
+        law, designed = about_what_is_held(read[0], model, at, zero), read[1]
         basis &= designed
         if file.hardware:
             _check_accepted(request, basis)
