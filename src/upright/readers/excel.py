@@ -21,6 +21,16 @@ _OLD = b"\xd0\xcf\x11\xe0"
 
 def read(source: Source) -> Record:
     """Record of the first sheet with rows of numbers."""
+    name, text, note = first_sheet(source)
+    try:
+        record = delimited.read(text)
+    except BadInput as error:
+        raise BadInput(f"Sheet '{name}' of {error}") from None
+    return replace(record, provenance=source.provenance("excel", note, *record.provenance.notes))
+
+
+def first_sheet(source: Source) -> tuple[str, Source, str]:
+    """Name of the first sheet with rows of numbers, what it would be as a text, and which others there are."""
     if source.data.startswith(_OLD):
         raise source.bad("this is Excel's old format; save it as .xlsx or CSV")
     try:
@@ -41,13 +51,8 @@ def read(source: Source) -> Record:
     if not with_numbers:
         raise source.bad(f"none of its sheets has rows of numbers: {', '.join(sheets)}; name the columns above them")
     name = with_numbers[0]
-    try:
-        record = delimited.read(Source(file=source.file, data=_text(sheets[name]).encode()))
-    except BadInput as error:
-        raise BadInput(f"Sheet '{name}' of {error}") from None
-    left = f", of {', '.join(with_numbers)}" if with_numbers[1:] else ""
-    notes = (f"Sheet '{name}'{left}.", *record.provenance.notes)
-    return replace(record, provenance=source.provenance("excel", *notes))
+    others = f", of {', '.join(with_numbers)}" if with_numbers[1:] else ""
+    return name, Source(file=source.file, data=_text(sheets[name]).encode()), f"Sheet '{name}'{others}."
 
 
 def _text(rows: Iterable[tuple[Any, ...]]) -> str:

@@ -47,6 +47,16 @@ def test_a_table_in_any_dialect_is_the_response_it_was_written_from(names, colum
     assert not read_back.drive.any()
 
 
+def test_a_workbook_of_excel_is_such_a_table_too(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in [("Frequency (Hz)", "Magnitude (dB)", "Phase (deg)"), *zip(HZ, DB, DEG, strict=True)]:
+        book.active.append(list(row))
+    book.save(tmp_path / "analyser.xlsx")
+    assert is_table(tmp_path / "analyser.xlsx")
+    np.testing.assert_allclose(response_of_table(tmp_path / "analyser.xlsx").response[:, 0], H, rtol=1e-9)
+
+
 def test_outputs_are_told_apart_by_their_names_and_take_those_that_are_asked(tmp_path):
     path = write(
         tmp_path / "two.csv", "freq [Hz];theta_re;theta_im;psi_re;psi_im", HZ, H.real, H.imag, -H.imag, H.real,

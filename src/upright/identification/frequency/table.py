@@ -10,15 +10,16 @@ import numpy as np
 from upright import units
 from upright.errors import BadInput
 from upright.identification.frequency.response import Array, Complex, FrequencyResponse
+from upright.readers import excel
 from upright.readers.delimited import layout
 from upright.readers.responses import UNITS, ResponseColumn, response_columns
-from upright.readers.source import load
+from upright.readers.source import TextTable, load
 
 
 def is_table(path: Path) -> bool:
     """Whether a file is a table whose columns are named like those of a frequency response."""
     try:
-        return bool(response_columns(layout(load(path)).names))
+        return bool(response_columns(_table(path).names))
     except BadInput:
         return False
 
@@ -39,7 +40,7 @@ def response_of_table(path: Path, signals: Mapping[str, str] | None = None) -> F
     BadInput
         When a column is missing, or the frequencies do not increase.
     """
-    text = layout(load(path))
+    text = _table(path)
     frequency, *held = response_columns(text.names)
     table = text.numbers()
     notes: list[str] = []
@@ -55,6 +56,11 @@ def response_of_table(path: Path, signals: Mapping[str, str] | None = None) -> F
         omega=omega[order], response=response, outputs=tuple(names.values()), coherence=coherence, notes=tuple(notes),
         units=(*(_si(held, own)[1] for own in names), ""),
     ).with_scatter()  # fmt: skip
+
+
+def _table(path: Path) -> TextTable:
+    source = load(path)
+    return layout(excel.first_sheet(source)[1] if excel.READER.recognises(source) else source)
 
 
 def _per_second(column: ResponseColumn, notes: list[str]) -> float:
