@@ -9,6 +9,9 @@ from zlib import crc32
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 import upright as up
 from tests.logs.runs import written
@@ -135,6 +138,34 @@ def test_a_few_wrong_values_of_every_argument_get_an_answer_or_a_sentence(name, 
 def test_every_wrong_value_of_every_argument_gets_an_answer_or_a_sentence(name, argument, beside):
     for wrong in WRONG:
         meets(name, argument, wrong)
+
+
+LEAVES = st.one_of(
+    st.none(), st.booleans(), st.integers(-3, 3), st.sampled_from([-1.5, 0.25, 1e300, math.nan, math.inf]),
+    st.complex_numbers(max_magnitude=5, allow_nan=False), st.binary(max_size=4), st.text("abx_=,;+-±° 12", max_size=10),
+    st.builds("{:g} {}".format, st.integers(-3, 3), st.sampled_from(["kg", "deg", "V", "ms", "N m/V", "rad/s", "cm"])),
+    st.sampled_from([MODEL, SAMPLED, ARM, RIG, SWING, up.Furuta, GAINS, abs]),
+)  # fmt: skip
+SMALL = st.integers(0, 3)
+ANYTHING = st.recursive(
+    LEAVES,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4), st.tuples(inner, inner),
+        st.dictionaries(st.text("abxm_p", max_size=4), inner, max_size=3),
+        arrays(np.float64, st.tuples(SMALL, SMALL), elements=st.sampled_from([-1.0, 0.0, 2.0, math.nan])),
+    ),
+    max_leaves=6,
+)  # fmt: skip
+"""Any type, shape and unit, small enough that what is right for an argument is answered soon."""
+
+
+@pytest.mark.slow
+@settings(max_examples=400, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+@given(of=st.sampled_from([pair for pair in ARGUMENTS if pair[0] not in LONG]), value=ANYTHING)
+def test_whatever_hypothesis_finds_for_an_argument_gets_an_answer_or_a_sentence(beside, of, value):
+    with suppress(up.UprightError, FileNotFoundError):
+        result = getattr(up, of[0])(**{**CALLS[of[0]], of[1]: value})
+        next(result, None) if inspect.isgenerator(result) else None
 
 
 SENTENCES = [
