@@ -73,7 +73,7 @@ def simulate(
     from upright.verbs.values import si
 
     on = known_options(MotionOptions, on, "simulate")
-    law = law.law if isinstance(law, Answer) else law
+    law = getattr(law, "law", law) if isinstance(law, Answer) else law
     limit, counts, memory, actuator = on.get("limit"), on.get("counts"), on.get("memory", 0.0), on.get("actuator")
     if is_linear(plant):
         others = {"at": at, "counts": counts, "memory": memory or None, "actuator": actuator}
@@ -187,7 +187,7 @@ def _rig(source: Any) -> Rig | None:
 
 def _plant(source: Any) -> Plant:
     plant = source if isinstance(source, Plant) else getattr(source, "plant", None)
-    if isinstance(plant, Plant):
+    if isinstance(plant, Plant) and not isinstance(source, Record):  # a motion is of a plant, and none itself
         return plant
     if isinstance(source, type) and issubclass(source, Plant):
         raise BadInput(f"simulate needs a plant with numbers: {source.__name__}({source.names()[0]}=..., ...).")

@@ -67,7 +67,7 @@ def chance(
     """
     from upright.basis import NOT_SUPPORTED, SIMULATED, in_percent
     from upright.control.preflight import WORDS, Task, preflight
-    from upright.designing.run import SPEEDS, velocities
+    from upright.designing.run import SPEEDS, Designed, velocities
     from upright.experiments.regulation_2.run import HAND, START
     from upright.gains import feedback
     from upright.report.page import Chapter, Part, Table, resting_on
@@ -89,7 +89,7 @@ def chance(
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     shared = Workers.of(workers)
     known = rig_of(fit, "chance", seed=seed, draws=draws)
-    designed = gains.value if isinstance(gains, Answer) else None
+    designed = gains.value if isinstance(gains, Answer) and isinstance(gains.value, Designed) else None
     if designed is not None and "limit" not in known.hardware.entries and designed.request.limit is not None:
         on = {"limit": designed.request.limit, **on}
     entries = rig_entries(known.plant, known.unit, on)
