@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from upright.errors import BadInput
 from upright.progress import Progress, silent
@@ -89,7 +89,8 @@ def chance(
         raise BadInput(f"draws needs a whole number of at least 1, got {draws}.")
     shared = Workers.of(workers)
     known = rig_of(fit, "chance", seed=seed, draws=draws)
-    designed = gains.value if isinstance(gains, Answer) and isinstance(gains.value, Designed) else None
+    answered: Any = gains.value if isinstance(gains, Answer) else None  # of whichever verb
+    designed = answered if isinstance(answered, Designed) else None
     if designed is not None and "limit" not in known.hardware.entries and designed.request.limit is not None:
         on = {"limit": designed.request.limit, **on}
     entries = rig_entries(known.plant, known.unit, on)
