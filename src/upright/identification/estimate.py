@@ -32,7 +32,9 @@ from upright.identification.inference.neglected import is_driven, lateness, negl
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.ties import ties, with_ties
-from upright.identification.inference.verdict import GOOD, Evidence, judge, trusted
+from upright.identification.inference.verdict import judge, trusted
+from upright.identification.inference.verdict.evidence import Evidence
+from upright.identification.inference.verdict.predicts import GOOD
 from upright.identification.ladder.growth import choose_friction
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Assumption, Estimate, Fit, Pole, RunScore

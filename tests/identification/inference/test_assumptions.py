@@ -10,7 +10,7 @@ import pytest
 from upright.errors import BadInput
 from upright.identification import Fit, GreyBox, Parameter, Run, identify
 from upright.identification.inference.assumptions import per_length, proportional, untouched
-from upright.identification.inference.verdict import USABLE
+from upright.identification.inference.verdict.evidence import USABLE
 from upright.physics import find
 from upright.simulation import simulate
 from upright.study import load_study

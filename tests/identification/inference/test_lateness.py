@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from upright.identification import GreyBox, Parameter, Run, identify
-from upright.identification.inference.verdict import USABLE
+from upright.identification.inference.verdict.evidence import USABLE
 from upright.physics import find
 from upright.simulation import simulate
 

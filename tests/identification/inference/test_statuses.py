@@ -18,7 +18,8 @@ from upright.identification.inference.intervals import (
     with_model_uncertainty,
 )
 from upright.identification.inference.loop import Standing
-from upright.identification.inference.verdict import Evidence, judge, trusted
+from upright.identification.inference.verdict import judge, trusted
+from upright.identification.inference.verdict.evidence import Evidence
 from upright.identification.model.fit import Estimate, Judgement, RunScore
 from upright.identification.model.grey_box import Parameter
 from upright.identification.model.runs import Run

@@ -13,7 +13,8 @@ from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swi
 from upright.identification.estimate import identify, predict
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.loop import standing
-from upright.identification.inference.verdict import Evidence, judge, trusted
+from upright.identification.inference.verdict import judge, trusted
+from upright.identification.inference.verdict.evidence import Evidence
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run

@@ -12,7 +12,9 @@ import pytest
 from tests.identification.twins import FURUTA, PENDULUM, rig
 from upright.identification.inference.loop import Standing
 from upright.identification.inference.promise import promise
-from upright.identification.inference.verdict import Evidence, judge, trusted, uninformative
+from upright.identification.inference.verdict import judge, trusted
+from upright.identification.inference.verdict.evidence import Evidence
+from upright.identification.inference.verdict.predicts import uninformative
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
 from upright.physics import Furuta, Pendulum

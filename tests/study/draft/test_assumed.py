@@ -12,7 +12,7 @@ import pytest
 
 import upright as up
 from upright.identification.estimate import identify
-from upright.identification.inference.verdict import USABLE
+from upright.identification.inference.verdict.evidence import USABLE
 from upright.simulation import simulate
 
 DT = 0.01

@@ -15,7 +15,7 @@ import numpy as np
 
 from upright.identification.inference.assumptions import assumption_sentences
 from upright.identification.inference.scoring import score_run
-from upright.identification.inference.verdict import GOOD
+from upright.identification.inference.verdict.predicts import GOOD
 from upright.identification.model.fit import Fit
 from upright.identification.model.grey_box import GreyBox, Parameter, neutral
 from upright.identification.model.runs import Run

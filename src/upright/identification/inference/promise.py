@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from upright.identification.inference.verdict import DROP, FEWEST, GOOD
+from upright.identification.inference.verdict.predicts import DROP, FEWEST, GOOD
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import RunScore
 
