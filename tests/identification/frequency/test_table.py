@@ -45,6 +45,7 @@ def test_a_table_in_any_dialect_is_the_response_it_was_written_from(names, colum
     np.testing.assert_allclose(read_back.omega, OMEGA, rtol=1e-10)
     np.testing.assert_allclose(read_back.response[:, 0], H, rtol=1e-9)
     assert not read_back.drive.any()
+    assert not read_back.states_coherence
 
 
 def test_a_workbook_of_excel_is_such_a_table_too(tmp_path):

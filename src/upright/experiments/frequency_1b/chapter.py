@@ -47,7 +47,8 @@ def log_chapter(result: LoggedResponse) -> Chapter:
     data, answer = result.response, result.answer
     response = _response_numbers(data)
     page = _page(data, answer, result.folder, run=None, sources=result.sources, response=response)
-    return replace(page, numbers=response if answer is None else _numbers(answer) | {"response": response})
+    numbers = response if answer is None else _numbers(answer) | {"response": response}
+    return replace(page, best="bode", numbers=numbers)
 
 
 def _page(

@@ -45,10 +45,10 @@ def _bode(data: FrequencyResponse, answer: FrequencyFit | None, fine: Sequence[t
     panels = [
         ChartPanel(title=f"{of}, magnitude", unit=f"dB{per}", lines=tuple(magnitude)),
         ChartPanel(title=f"{of}, phase", unit="deg", step=90.0 if np.ptp(turn) > 200 else 45.0, lines=tuple(phase)),
-        ChartPanel(
-            title="coherence", lines=(coherent,), limits=(min(0.9, float(coherent.y.min()) - 0.02), 1.02), height=80.0
-        ),
     ]
+    if data.states_coherence:
+        least = min(0.9, float(coherent.y.min()) - 0.02)
+        panels.append(ChartPanel(title="coherence", lines=(coherent,), limits=(least, 1.02), height=80.0))
     if answer is not None:
         at, models = answer.used, (answer.squares.way.model, answer.simplex.model)
         missed = tuple(
@@ -79,7 +79,7 @@ def quality_chart(data: FrequencyResponse) -> Chart:
     """
     amplitude = np.abs(data.response * data.drive[:, None])
     shown = (
-        (np.maximum(1 - data.coherence, 1e-9), "1 − coherence", ""),
+        (np.maximum(1 - data.coherence, 1e-9) * data.states_coherence, "1 − coherence", ""),
         (data.distortion, "harmonics over fundamental", ""),
         (np.maximum(100 * data.error, 1e-5), "standard error", "%"),
         (amplitude, "amplitude", ""),

@@ -133,6 +133,11 @@ class FrequencyResponse:
         return 20 * np.log10(np.abs(self.response))
 
     @property
+    def states_coherence(self) -> bool:
+        """Whether anybody said how much of the outputs follows the command: nothing measured follows it wholly."""
+        return bool((self.coherence < 1).any())
+
+    @property
     def error(self) -> Array:
         """Standard deviation of the relative error of the magnitude, and of the phase [rad], shape (F, n)."""
         return np.sqrt(self.variance / 2) / np.abs(self.response)
