@@ -19,6 +19,7 @@ from upright.report.page import Chapter, Symbol, simulated
 from upright.report.prose import Placed, chapter_of
 from upright.report.rig import rig_drawing
 from upright.report.symbols import unit
+from upright.rig.makes import MOTOR_AND_BELT
 
 _TILTED = ("level_model", "tilt_model", "spring")
 
@@ -39,7 +40,7 @@ def chapter(result: FreeSwing) -> Chapter:
         level=_worst_fitted(fits["level_model"]) if both else None,
         leaning=_worst_fitted(fits["tilt_model"]) if both else None,
         pole=float(result.rig.plant.linear("inverted").poles().real.max()),
-        lean_of=lambda sine: math.degrees(math.asin(sine)),
+        lean_of=lambda sine: math.degrees(math.asin(sine)), belt=MOTOR_AND_BELT,
         placed=_placed(fit, truth) if fit else {},
         figures={
             "truth": lambda: interval_figure(fit.estimates if fit else {}, truth=truth),

@@ -42,7 +42,8 @@ def enough_for_a_loop(evidence: Evidence, *, supported: bool) -> Judgement:
     if not evidence.driven:
         return Judgement(
             question=LOOP, answer="not tested",
-            headline=f"{where[0].upper()}{where[1:]}; no fitted run was driven, so what the drive does is not known.",
+            headline=f"{where[0].upper()}{where[1:]}; no fitted run was driven, so what the drive does, "
+            "and adds where it was off, is not known.",
             advice="Add a run in which the drive acts, and identify again.",
         )  # fmt: skip
     half = (s.growth.interval[1] - s.growth.interval[0]) / 2 / s.growth.value
