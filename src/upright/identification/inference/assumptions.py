@@ -121,6 +121,15 @@ def _ratios(a: Assumption, rested: Sequence[Assumption], estimates: Mapping[str,
     for n, name in {**per, **lumped}.items():
         e = a.without.get(n, estimates[n])
         scaled = n in per and n not in a.without
+        beside = _beside(n, a, others, estimates) if scaled else None
+        if beside is not None:
+            name, e = f"{n}/({a.name} {beside})", _quotient(e, estimates[beside])
+            out[name] = replace(
+                e, value=e.value / a.value, stderr=e.stderr / abs(a.value),
+                interval=(e.interval[0] / a.value, e.interval[1] / a.value), rests_on=(),
+                unit=_per(estimates[n].unit, f"{a.unit} {estimates[beside].unit}"),
+            )  # fmt: skip
+            continue
         scale = 1 / a.value if scaled else 1.0
         rest = [b for b in others if n in resting(b)]
         low, high = _over_ranges(e.interval, n, rest)
@@ -130,6 +139,31 @@ def _ratios(a: Assumption, rested: Sequence[Assumption], estimates: Mapping[str,
             status=_resting(e, [b.name for b in rest]),
         )  # fmt: skip
     return out
+
+
+def _beside(n: str, a: Assumption, others: Sequence[Assumption], estimates: Mapping[str, Estimate]) -> str | None:
+    """An estimate that follows all other assumed numbers as `n` does, and not `a`; None where `n` follows none.
+
+    The equation of a pendulum about its hinge, divided by m_p l_cg, is known whatever J_p is.
+    """
+    rest = [b for b in others if n in resting(b)]
+    if not rest or a.value <= 0:
+        return None
+    feeling = {m for b in others for m in resting(b) if b not in rest} | set(resting(a))
+    alike = (
+        m for m in rest[0].follows
+        if m != n and m not in feeling and estimates[m].interval[0] > 0
+        and all(abs(b.follows[m] - b.follows[n]) < NEGLIGIBLE for b in rest)
+    )  # fmt: skip
+    return min(alike, key=lambda m: estimates[m].stderr / estimates[m].value, default=None)
+
+
+def _quotient(above: Estimate, below: Estimate) -> Estimate:
+    """One estimate per another, as wide as both intervals together make it."""
+    ends = [x / y for x, y in product(above.interval, below.interval)]
+    value = above.value / below.value
+    stderr = above.stderr / below.value + abs(value) * below.stderr / below.value
+    return replace(above, value=value, stderr=stderr, interval=(min(ends), max(ends)))
 
 
 def _per(above: str, below: str) -> str:
@@ -150,7 +184,8 @@ def _moves(best: Optimum, assumed: Sequence[Parameter], places: Sequence[int]) -
     steps = np.array([1e-6 * u.scale for u in extra])
     wider = replace(problem, unknowns=[*problem.unknowns, *extra], steps=np.concatenate([problem.steps, steps]))
     z = np.concatenate([x, [u.coordinate(u.value) for u in extra]])
-    normal = wider.settle_steps(z)
+    wider.settle_steps(z)
+    normal = wider.normal(z)  # at the steps that were chosen, not near them: ties are told apart by exponents
     sizes = np.array([abs(p.value) for p in assumed])
     if not math.isfinite(normal.cost):
         return None, sizes

@@ -81,8 +81,8 @@ class Assumption:
     evaluated, `without` the estimates proportional to it, per unit of the command and of the encoders. The size is its
     absolute value; of one assumed to be zero, what changes the runs as much as the most influential estimate does.
     Nobody measured it, so it may lie anywhere in its `range`. `ratios` are known whatever it is, by what they are
-    called: estimates per what they are proportional to, ``b_2/m_p``, and what an estimate is worth beside a number
-    assumed to be zero, ``J_A/(m_p l_cg)``.
+    called: estimates per what they are proportional to, ``b_2/m_p`` or ``b_2/(m_p l_cg)``, and what an estimate is
+    worth beside a number assumed to be zero, ``J_A/(m_p l_cg)``.
     """
 
     name: str
