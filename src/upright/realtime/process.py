@@ -19,6 +19,7 @@ from typing import Any
 
 from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import of_values
+from upright.realtime.desk import Desk
 from upright.realtime.interrupts import ENDING, ignoring
 from upright.realtime.pace import Pace, Virtual, WallClock
 from upright.realtime.priority import step_forward
@@ -71,7 +72,7 @@ class _Window:
 
 
 def run_in_process(
-    order: RunOrder, *, watch: Callable[[RunState], str] = lambda _: "", paced: bool = True
+    order: RunOrder, *, watch: Callable[[RunState], str] = lambda _: "", paced: bool = True, desk: Desk | None = None
 ) -> RunEnd:  # fmt: skip
     """Run a law on a rig in a process of its own.
 
@@ -81,6 +82,8 @@ def run_in_process(
         Shown the state some twenty times a second; answers with a sentence when it wants the run to end.
     paced : bool
         Whether ticks wait for the clock on the wall; twins and replays can do without.
+    desk : Desk, optional
+        Where every tick is shown, and from where the run can be stopped, tapped and given other gains.
 
     Raises
     ------
@@ -97,7 +100,7 @@ def run_in_process(
     stop, looks = context.RawValue("b", 0), context.RawValue("q", 0)
     ours, theirs = context.Pipe(duplex=False)
     child = context.Process(
-        target=_child, args=(os.getpid(), order, memory, phase, stop, looks, theirs, paced), name="upright loop"
+        target=_child, args=(os.getpid(), order, memory, phase, stop, looks, theirs, paced, desk), name="upright loop"
     )
     with ignoring():  # Ctrl-C reaches a whole group of processes; the child is stopped by its flag
         child.start()
@@ -152,7 +155,8 @@ def _ask(stop: Any, watch: Callable[[RunState], str], window: _Window) -> None:
 
 
 def _child(
-    parent: int, order: RunOrder, memory: Any, phase: Any, stop: Any, looks: Any, pipe: Connection, paced: bool
+    parent: int, order: RunOrder, memory: Any, phase: Any, stop: Any, looks: Any, pipe: Connection, paced: bool,
+    desk: Desk | None = None,
 ) -> None:  # fmt: skip
     import signal
 
@@ -164,7 +168,7 @@ def _child(
         return  # before anything is opened
 
     def stopped() -> str:
-        if stop.value:
+        if stop.value or (desk is not None and desk.stopping):
             return BY_HAND
         if orphan():
             return "The program that started the loop is gone."
@@ -174,13 +178,19 @@ def _child(
         if not paced:
             return Virtual(), ""
         standing = step_forward(fifo=order.fifo)
-        if about.paced or about.virtual:
+        if about.paced or (about.virtual and not order.wall):
             return Virtual(), standing.warning
         return WallClock(about.period, vigil=standing.vigil), standing.warning
 
+    def show(state: RunState) -> None:
+        window.put(state)
+        if desk is not None:
+            desk.put(state)
+
+    heard: dict[str, Any] = {} if desk is None else {"heed": desk.heed}
     answer: Any
     try:
-        answer = carry_out(order, law=of_values(order.law), show=window.put, stopped=stopped, pace=clock)
+        answer = carry_out(order, law=of_values(order.law), show=show, stopped=stopped, pace=clock, **heard)
     except UprightError as error:
         answer = error if isinstance(error, RigStopped | BadInput) else RigStopped(str(error))
     except BaseException:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -30,7 +30,8 @@ QUIET = 0.3
 class Stage:
     """A rig with its supervisor, and the hands that bring it where a run starts and let it go.
 
-    `bring` and `let_go` act on a twin; with a rig of its own a person does it, and both do nothing.
+    `bring`, `let_go` and `tap`, which adds to the speeds of the coordinates, act on a twin; with a rig of its own a
+    person does it, and they do nothing.
     """
 
     supervisor: Supervisor
@@ -38,6 +39,7 @@ class Stage:
     let_go: Callable[[], None]
     units: tuple[str, ...]
     advice: str = ""
+    tap: Callable[[Sequence[float]], None] = lambda _: None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +64,8 @@ class RunOrder:
         Whether a process of its own asks for FIFO priority.
     accepted : str
         Why somebody runs a law whose model is not trusted, for the log.
+    wall : bool
+        Whether a twin's ticks wait for the clock on the wall too, for somebody who looks on.
     """
 
     make: Callable[[], Stage]
@@ -75,6 +79,7 @@ class RunOrder:
     references: tuple[tuple[str, str], ...] = ()
     fifo: bool = True
     accepted: str = ""
+    wall: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +97,10 @@ class RunScene:
 
 @dataclass(frozen=True, kw_only=True)
 class RunState:
-    """How a run goes; time and ticks since its loop began, ``readings`` as deviations from what is held."""
+    """How a run goes; time and ticks since its loop began, ``readings`` as deviations from what is held.
+
+    ``counts`` are those of the encoders, as if each counted upwards; none before the loop begins.
+    """
 
     phase: str
     time: float = 0.0
@@ -103,6 +111,7 @@ class RunState:
     command: float = 0.0
     applied: float = 0.0
     readings: tuple[float, ...] = ()
+    counts: tuple[int, ...] = ()
     scene: RunScene = RunScene()
 
 
@@ -167,6 +176,7 @@ def carry_out(
     show: Callable[[RunState], None] = lambda _: None,
     stopped: Callable[[], str] = lambda: "",
     pace: Callable[[Capabilities], tuple[Pace, str]] = lambda _: (Virtual(), ""),
+    heed: Callable[[Stage], float | None] = lambda _: None,
 ) -> RunEnd:
     """Run a law on a rig, whatever happens with zero at the end.
 
@@ -178,6 +188,8 @@ def carry_out(
         Called at every tick: why to end: a sentence, or an empty one.
     pace : callable
         Gives the clock of the loop for a rig, and a warning about it; called when all is ready.
+    heed : callable
+        Called before each answer, to change what runs; gives the law's reference, or None for its own.
     """
     hear = _Events()
     stage = order.make()
@@ -197,7 +209,7 @@ def carry_out(
         fitted = beside.aim(law)
         end["target"] = beside.target
         # in virtual time the loop may be ahead of the log by all of the run
-        waiting = min(round(order.seconds / about.period) + 100, 1 << 20) if about.virtual else 0
+        waiting = min(round(order.seconds / about.period) + 100, 1 << 20) if about.virtual and not order.wall else 0
         hear.log = LogWriter(order.log, header=_header(order, stage, fitted), rows=max(8192, waiting))
         for event in hear.events:
             hear.log.event(*event)
@@ -208,7 +220,7 @@ def carry_out(
         beside.braked = partial(_braked, hear.log, beside, order)
         beside.start(order.mode)
         stage.let_go()
-        _loop(order, beside, ticking, hear.log, show, end)
+        _loop(order, beside, ticking, hear.log, show, partial(heed, stage), end)
         beside.finish()
         finished = True
     except RigStopped as stop:
@@ -231,14 +243,14 @@ def carry_out(
 
 def _loop(
     order: RunOrder, beside: Supervisor, pace: Pace, log: LogWriter, show: Callable[[RunState], None],
-    end: dict[str, Any],
+    heed: Callable[[], float | None], end: dict[str, Any],
 ) -> None:  # fmt: skip
     """The only loop: answer a sample, wait for the deadline, hand over the answer and take the next sample."""
     about, began = beside.about, clock.monotonic()
     first = tick = _exchanged(beside, 0.0)
     try:
         for _ in range(max(1, math.ceil(order.seconds / about.period - 1e-9))):
-            command = beside.step(tick)
+            command = beside.step(tick, heed())
             pace.wait()
             following = _exchanged(beside, command)
             if not beside.stale:
@@ -285,6 +297,7 @@ def _state(beside: Supervisor, tick: Tick, command: float, first: Tick, end: Map
         phase="running", time=tick.time - first.time, tick=end["ticks"], late=end["late"], mode=tick.mode,
         faults=tick.faults,
         command=command, applied=tick.applied, readings=away,
+        counts=tuple(n if per > 0 else -n for n, per in zip(tick.counts, beside.about.counts, strict=True)),
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -15,6 +16,8 @@ from upright.rigs.protocol import Capabilities, Limits
 
 STEP_SAMPLES = 100
 """For which one count is held to see what a law's memories add up."""
+RECENT = 64
+"""Readings after which the memories of another law are those of its own, but for 1e-19 of what a filter of 0.5 had."""
 GROWTH = 64 ** (1 / 512)
 """Largest size of a law's own pole: e-fold in no less than 123 samples."""
 
@@ -62,6 +65,7 @@ class RunningLaw:
         self.references: tuple[float, ...] = ()  # at the tick that was answered last
         self._signal: list[list[float]] = law.signal().tolist()
         self._own = isinstance(law, Rule)
+        self._recent: deque[tuple[Sequence[float], float | None, float | None]] = deque(maxlen=RECENT)
         if isinstance(law, Law) and (m := law.signal().shape[1]):
             n = law.readings
             begin = None if law.begin is None else np.hstack([law.begin, np.zeros((len(law.begin), m))])
@@ -90,9 +94,18 @@ class RunningLaw:
         if reference is not None and row:
             row[0] = reference
         self.references = tuple(row)
+        self._recent.append((readings, reference, time))
         inputs = readings if self._own else (*readings, *row)
         self.ticks += 1
         return self._step((self.ticks - 1) * self.period if time is None else time, inputs)[0]
+
+    def going_on(self, law: Law | Rule) -> RunningLaw:
+        """Another law in the place of this one, that remembers the last `RECENT` readings as if it had read them."""
+        other = RunningLaw(law, self.period)
+        other.ticks = self.ticks - len(self._recent)
+        for readings, reference, time in self._recent:
+            other.step(readings, reference, time)
+        return other
 
 
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:

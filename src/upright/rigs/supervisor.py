@@ -212,10 +212,8 @@ class Supervisor:
             When the law is for another rig or period.
         """
         fitted = for_rig(law, self.about, self.held)
-        if absurd := absurdity(fitted, self.about, self.held):
-            self._give_up(Fault.GAINS, f"{self.about.name} is not started: {absurd}.")
-        if complaint := self._falls(fitted):
-            self._give_up(Fault.GAINS, complaint)
+        if unfit := absurdity(fitted, self.about, self.held) or self._falls(fitted):
+            self._give_up(Fault.GAINS, f"{self.about.name} is not started: {unfit}.")
         if self.about.replayed:
             self.target = self._own_target(fitted)
         else:
@@ -321,6 +319,25 @@ class Supervisor:
                     self._give_up(*wrong, body_trusted=self._doubts.body_trusted)
         self._command = command if self._mode == Mode.HOST else self._running.followed
         return self._command
+
+    def change(self, law: Law) -> str:
+        """Go on by other gains from the next sample on; why not, as a sentence, or an empty text.
+
+        Nothing of the law that runs is changed where they are refused.
+
+        Raises
+        ------
+        BadInput
+            When the law is for another rig or period.
+        """
+        if self._running is None or self._mode != Mode.HOST:
+            return f"{self.about.name} runs no law of the host whose gains could be changed."
+        fitted = for_rig(law, self.about, self.held, self.target)
+        if unfit := absurdity(fitted, self.about, self.held) or self._falls(fitted):
+            return f"These gains are not applied: {unfit}."
+        self.law, self._running = fitted, self._running.going_on(fitted)
+        self.event(self._time, "law", "other gains from here on")
+        return ""
 
     def _since(self, before: Tick, tick: Tick) -> Iterator[tuple[float, list[float]]]:
         """Time and readings of every tick after one, on a straight line where samples in between did not come."""
@@ -484,7 +501,7 @@ class Supervisor:
         return tuple(p + d * (readings[i] - point[i]) for p, d in zip(out, along, strict=True))
 
     def _falls(self, law: Law | Rule) -> str:
-        """Why the model falls under this law; empty when it stands, or nobody knows."""
+        """Why the model falls under this law, as a clause; empty when it stands, or nobody knows."""
         model = self.duty.model
         if model is None or isinstance(law, Rule):
             return ""
@@ -494,8 +511,8 @@ class Supervisor:
         if largest < 1.0 + 1e-9:
             return ""
         return (
-            f"{self.about.name} is not started: under this law its model falls, by a factor e every "
-            f"{model.period / math.log(largest):.3g} s. Design a law for this rig (upright design)."
+            f"under this law its model falls, by a factor e every {model.period / math.log(largest):.3g} s; design a "
+            "law for this rig (upright design)"
         )
 
     def _shown(self, value: float) -> str:

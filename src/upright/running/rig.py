@@ -153,6 +153,7 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
     )  # fmt: skip
     rig = live_rig(file, model, truth)
     bring, let_go, advice = _nothing, _nothing, ""
+    tap = rig.port.push if isinstance(rig, Board) and isinstance(rig.port, TwinPort) else _unfelt
     if isinstance(rig, Board) and isinstance(rig.port, TwinPort):
         if abs(tilt) > duty.near:
             size, unit = (math.degrees(1.0), "deg") if last == "rad" else (1.0, last)
@@ -170,12 +171,17 @@ def stage_of(path: Path, *, balance: bool = True, tilt: float = 0.0, watch: bool
         middle = "".join(f", {name} in the middle of its travel," for name in others)
         advice = f"bring {swings} to '{at}'{middle} and hold still; let go when it is held"
     return Stage(
-        supervisor=Supervisor(rig, duty), bring=bring, let_go=let_go, units=tuple(units.values()), advice=advice
-    )
+        supervisor=Supervisor(rig, duty), bring=bring, let_go=let_go, units=tuple(units.values()), advice=advice,
+        tap=tap,
+    )  # fmt: skip
 
 
 def _nothing() -> None:
     """What a person does."""
+
+
+def _unfelt(_speeds: Sequence[float]) -> None:
+    """A tap on a rig that only a person can tap."""
 
 
 def read_law(path: Path) -> tuple[Law | Rule, Basis]:

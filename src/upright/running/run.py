@@ -220,6 +220,27 @@ class RigRun:
         return f"{text}; {name} cycles by {size} every {body.period:.2g} s"
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PreparedRun:
+    """A run that can begin; attributes as of `RunOrder` and `RigRun`."""
+
+    request: RunRequest
+    file: RigFile
+    model: Rig
+    law: Law | Rule
+    basis: Basis
+    order: RunOrder
+    scene: RunScene
+
+    def ended(self, end: RunEnd) -> RigRun:
+        """What it came to, by its log."""
+        path = self.order.log
+        log = read_log(path) if path.exists() else None
+        return RigRun(
+            request=self.request, file=self.file, model=self.model, end=end, log=log, log_path=path, basis=self.basis
+        )
+
+
 def run_rig(
     request: RunRequest, folder: Path, *, watch: Callable[[RunState], str] = lambda _: ""
 ) -> RigRun:  # fmt: skip
@@ -231,6 +252,29 @@ def run_rig(
         Takes the log.
     watch : callable
         Shown how it goes; answers with a sentence when it wants the run to end.
+
+    Raises
+    ------
+    BadInput
+        As `prepared`.
+    """
+    run = prepared(request, folder)
+
+    def shown(state: RunState) -> str:
+        return watch(replace(state, scene=run.scene))
+
+    if run.file.hardware or request.own_process:
+        return run.ended(run_in_process(run.order, watch=shown, paced=run.file.hardware))
+    return run.ended(_inline(run.order, run.law, shown))
+
+
+def prepared(request: RunRequest, folder: Path) -> PreparedRun:
+    """What is requested, from its files; nothing is opened yet.
+
+    Parameters
+    ----------
+    folder : Path
+        Takes the log.
 
     Raises
     ------
@@ -280,16 +324,7 @@ def run_rig(
         readings=tuple(units.items()), command_unit=model.unit, seconds=request.seconds,
         limit=model.saturation if limits is None else min(model.saturation, limits.command),
     )  # fmt: skip
-
-    def shown(state: RunState) -> str:
-        return watch(replace(state, scene=scene))
-
-    if file.hardware or request.own_process:
-        end = run_in_process(order, watch=shown, paced=file.hardware)
-    else:
-        end = _inline(order, law, shown)
-    log = read_log(path) if path.exists() else None
-    return RigRun(request=request, file=file, model=model, end=end, log=log, log_path=path, basis=basis)
+    return PreparedRun(request=request, file=file, model=model, law=law, basis=basis, order=order, scene=scene)
 
 
 def _check_accepted(request: RunRequest, basis: Basis) -> None:
