@@ -61,6 +61,7 @@ experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
 experiments
 exports
+bench
 verbs
 views
 cli
@@ -97,6 +98,8 @@ DOORS = {
     "typst": "report",
     "pint": "units",
     "typer": "cli",
+    "starlette": "bench",
+    "uvicorn": "bench",
     "mcap": "logs",
     "zstandard": "logs",
     "serial": "line",

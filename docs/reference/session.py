@@ -231,6 +231,10 @@ up.run("RIG.toml", law="regulate/design.json", duration=5, out="upright-run")
 # %% rig_doctor
 up.rig_doctor("RIG.toml")
 
+# %% bench
+with up.bench(out="bench", port=0, browser=False, fifo=False) as bench:
+    print(bench.rigs, bench.url)
+
 # %% rig_check
 up.rig_check(seconds=1, fifo=False)
 

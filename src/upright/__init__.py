@@ -23,7 +23,7 @@ Model       identify, predict, ladder, frequency, loadings, plan_inertias
 Plants      Pendulum, CartPendulum, Furuta, DoublePendulum, DoublePendulumAbsolute, FlexibleLink, chain
 Rig         Rig: a plant with drive, encoders and servo, and where each number comes from; from_mjcf: that of MuJoCo
 Control     StateSpace, from_matlab, place, lqr, dlqr, prefilter, hold, observer, margins, simulate, chance, design,
-            export, regulate, swing_up, track, play; Law, Rule
+            export, regulate, swing_up, track, play, bench; Law, Rule
 Course      lab, reproduce, survey
 Own plants  Plant, Coordinate, Input, Joint, quantity
 ==========  ==================================================================================================
@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from upright.records import Record
     from upright.rig import Rig
     from upright.systems import StateSpace
+    from upright.verbs.control.bench import bench
     from upright.verbs.control.chance import chance
     from upright.verbs.control.design import design
     from upright.verbs.control.play import play
@@ -104,6 +105,7 @@ _HOMES = {
     "quantities": ("quantity",),
     "records": ("Record",),
     "rig": ("Rig",),
+    "verbs.control.bench": ("bench",),
     "verbs.control.chance": ("chance",),
     "verbs.control.design": ("design",),
     "verbs.control.play": ("play",),
@@ -134,7 +136,7 @@ __all__ = [
     "BadInput", "CartPendulum", "Coordinate", "DoublePendulum", "DoublePendulumAbsolute", "FlexibleLink", "Furuta",
     "ImpossiblePhysics", "Input", "Joint", "Law", "NotIdentifiable", "Pendulum", "Plant", "Record", "Rig", "Rule",
     "StateSpace",
-    "UprightError", "__version__", "chain", "chance", "compare", "design", "dlqr", "doctor", "export",
+    "UprightError", "__version__", "bench", "chain", "chance", "compare", "design", "dlqr", "doctor", "export",
     "firmware_build", "firmware_flash", "firmware_pins", "frequency", "from_matlab", "from_mjcf", "hold",
     "identify", "init", "lab", "ladder", "law", "loadings", "log_convert", "log_recover", "log_replay", "log_show",
     "log_tail", "lqr", "margins", "observer", "place", "plan_inertias", "play", "predict", "prefilter", "quantity",

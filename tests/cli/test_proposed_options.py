@@ -25,9 +25,9 @@ OPTION = re.compile(r"(?<![\w-])(?<!var\()--[a-z][a-z-]*")
 PROPOSED = re.compile(rf"upright ({'|'.join([*(f'{a} {b}' for a, bs in NESTED.items() for b in bs), *COMMANDS])})\b")
 OTHERS = {
     "--upload", "--path", "--eval", "--mjcf", "--show-plot", "--start-values", "--always", "--dirty", "--error-unmatch",
-    "--nthreads",
+    "--nthreads", "--prefix",
 }  # fmt: skip
-"""Options of arduino-cli, Octave, MuJoCo, FMPy, git and Dask."""
+"""Options of arduino-cli, Octave, MuJoCo, FMPy, git, Dask and npm."""
 SHOWN_BY = {
     "rigs/firmware": "firmware flash",
     "rigs": "run", "realtime": "run", "running/run.py": "run", "running/rig.py": "run",

@@ -28,6 +28,7 @@ LOOP = up.simulate(RIG, GAINS, at="inverted", start={"theta": 0.02}, seconds=0.5
 KNOWN = {"m_p": 0.2, "J_p": 0.0}
 
 CALLS = {
+    "bench": {"rigs": "RIG.toml", "port": -1, "out": "bench", "browser": False},
     "chain": {"bodies": 2},
     "chance": {"fit": RIG, "gains": GAINS, "draws": 2, "seconds": 0.1},
     "compare": {"fits": "fit.json", "log": SWING},

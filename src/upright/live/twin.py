@@ -47,6 +47,15 @@ class Loop:
     law: Law
 
 
+def unplayable(rig: Rig) -> str | None:
+    """What a rig lacks to move in a page; None where nothing is."""
+    if "inverted" not in rig.plant.equilibria or len(rig.plant.inputs) != 1:
+        return f"a rig with one drive and an inverted equilibrium, and {rig.name} is none"
+    if not rig.plant.outline(rig.plant, [0.0] * len(rig.plant.coordinates)):
+        return f"a plant that says how it is drawn; give {type(rig.plant).__name__} its outline(p, q)"
+    return None
+
+
 def moving(rig: Rig, loop: Loop, task: Task, *, others: Mapping[str, Array], lanes: int, seed: int) -> dict[str, Any]:
     """What the page's script takes, as JSON holds it.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from upright import units
 from upright.errors import BadInput, nearest
 from upright.experiments.frequency_1b.sweeps import Sweep, broadband, stepped_sine
-from upright.experiments.stand.known import Known, bench, model_of
+from upright.experiments.stand.known import Known, bench_values, model_of
 from upright.identification import GreyBox
 from upright.identification.frequency.answer import FrequencyFit, explain
 from upright.identification.frequency.fitting import nonlinear_friction
@@ -100,7 +100,7 @@ def run_frequency(
     sweep = stepped_sine(rig, make) if kind == "sines" else broadband(rig, make, kind, seed=seed)
     if stopped():
         raise KeyboardInterrupt
-    known, tolerance = bench(rig, make), dict(make.bench)
+    known, tolerance = bench_values(rig, make), dict(make.bench)
     for k in weighed:
         known[k.name], tolerance[k.name] = k.value, k.stderr / k.value
     at = next(iter(rig.plant.equilibria))

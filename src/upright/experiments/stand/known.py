@@ -24,7 +24,7 @@ class Known:
     stderr: float
 
 
-def bench(rig: Rig, make: Make) -> dict[str, float]:
+def bench_values(rig: Rig, make: Make) -> dict[str, float]:
     """What the bench says of the numbers that it tells, each off by its tolerance; exact for the rig as designed."""
     rng = np.random.default_rng([rig.seed, 43])
     true = rig.plant.parameters()

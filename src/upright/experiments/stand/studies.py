@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from upright.experiments.stand.known import Known, bench, model_of
+from upright.experiments.stand.known import Known, bench_values, model_of
 from upright.experiments.stand.stand import APPLIED, TestStand
 from upright.files import read_text, replace_file
 from upright.quantities import with_unit
@@ -85,7 +85,7 @@ def _tables_of(stand: TestStand, folder: Path) -> Tables:
 def _of_make(stand: TestStand) -> Tables:
     """What the maker designed, and what the bench says of this twin."""
     make = make_of(stand.rig.plant)
-    start = model_of(make, bench(stand.twin, make), make.bench)
+    start = model_of(make, bench_values(stand.twin, make), make.bench)
     values: Tables = {"parameters": {}, "actuator": {}}
     for name, p in start.parameters.items():
         where, _, key = name.rpartition(".")

@@ -32,6 +32,7 @@ def played(
     from upright.designing.proposal import design_unasked
     from upright.designing.run import DesignRequest, design_for
     from upright.files import replace_file
+    from upright.live.twin import unplayable
     from upright.report.page import Chapter, Step, resting_on
     from upright.rig.completion import completed, doubts
 
@@ -186,15 +187,6 @@ def live_part(name: str, draw: Callable[[], str], title: str = "Push it", *, sho
     except UprightError:
         return ()
     return (Part(title, (Live(markup=markup, description=f"{title}: {name}", short=short),), aside=True),)
-
-
-def unplayable(rig: Rig) -> str | None:
-    """What a rig lacks to move in a page; None where nothing is."""
-    if "inverted" not in rig.plant.equilibria or len(rig.plant.inputs) != 1:
-        return f"a rig with one drive and an inverted equilibrium, and {rig.name} is none"
-    if not rig.plant.outline(rig.plant, [0.0] * len(rig.plant.coordinates)):
-        return f"a plant that says how it is drawn; give {type(rig.plant).__name__} its outline(p, q)"
-    return None
 
 
 def live_page(

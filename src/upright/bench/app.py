@@ -1,0 +1,199 @@
+"""What the bench answers: its page, what rigs there are, their runs, and a socket for each rig."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncGenerator, Sequence
+from contextlib import asynccontextmanager, suppress
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from upright._version import __version__
+from upright.bench.hub import Hub
+from upright.bench.messages import read
+from upright.bench.outbox import Outbox
+from upright.bench.runs import in_own_process, listed
+from upright.bench.station import Station, obey
+from upright.bench.twin_script import twin_script
+from upright.errors import BadInput, UprightError
+
+RATE = 40.0
+"""Frames a second."""
+PATIENCE = 10
+"""Messages in a row that are not understood before a connection is closed."""
+SWIFTEST = 50.0
+"""Messages of a client in a second."""
+SCRIPT, STYLE = "text/javascript; charset=utf-8", "text/css; charset=utf-8"
+SHARED = {
+    "drawing.js": ("upright.live", "drawing.js", SCRIPT),
+    "kernel.js": ("upright.live", "kernel.js", SCRIPT),
+    "twin.js": ("upright.live", "twin.js", SCRIPT),
+    "uPlot.js": ("upright.report.interactive", "uplot/uPlot.iife.min.js", SCRIPT),
+    "uPlot.css": ("upright.report.interactive", "uplot/uPlot.min.css", STYLE),
+    "tokens.css": ("upright.report", "templates/tokens.css", STYLE),
+    "bench.js": ("upright.bench", "page/bench.js", SCRIPT),
+    "bench.css": ("upright.bench", "page/bench.css", STYLE),
+}
+"""What the page is made of, by its name in an address: package, file, type. The scripts are those of the reports."""
+NOT_BUILT = (
+    "The page of the bench is not built here. In a source tree: npm --prefix bench install && npm --prefix bench run "
+    "build. The server works: /api/rigs, /live/NAME."
+)
+
+
+def application(stations: Sequence[Station]) -> Starlette:
+    """The bench of some rigs."""
+    hubs = {station.rig.name: Hub(station) for station in stations}
+    scripts: dict[str, asyncio.Task[str]] = {}
+
+    async def page(_: Request) -> Response:
+        content = _content("upright.bench", "page/index.html")
+        return PlainTextResponse(NOT_BUILT) if content is None else Response(content, media_type="text/html")
+
+    async def asset(request: Request) -> Response:
+        package, name, kind = SHARED.get(request.path_params["name"], ("", "", ""))
+        content = _content(package, name) if package else None
+        return _nothing() if content is None else Response(content, media_type=kind)
+
+    async def rigs(_: Request) -> Response:
+        known = [
+            {"name": n, "title": h.station.rig.model.name, "kind": h.station.rig.kind, "state": h.station.state,
+             "operated": bool(h.station.lease.holder)}
+            for n, h in hubs.items()
+        ]  # fmt: skip
+        return JSONResponse({"version": __version__, "rigs": known})
+
+    async def script(request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in hubs:
+            return _nothing()
+        if name not in scripts:
+            scripts[name] = asyncio.create_task(asyncio.to_thread(in_own_process, twin_script, hubs[name].station.rig))
+        try:
+            return Response(await asyncio.shield(scripts[name]), media_type=SCRIPT)
+        except UprightError as error:
+            return PlainTextResponse(str(error), status_code=404)
+
+    async def runs(request: Request) -> Response:
+        hub = hubs.get(request.path_params["name"])
+        return _nothing() if hub is None else JSONResponse(listed(hub.station.folder, hub.station.rig.name))
+
+    async def result(request: Request) -> Response:
+        hub = hubs.get(request.path_params["name"])
+        return _nothing() if hub is None else _result(hub.station.folder, hub.station.rig.name, request.url.path)
+
+    async def live(socket: WebSocket) -> None:
+        hub = hubs.get(socket.path_params["name"])
+        joined = None if hub is None else hub.join(socket.query_params.get("me", ""))
+        if hub is None or joined is None:
+            await socket.close(4404, "no such rig" if hub is None else "too many look on")
+            return
+        who, outbox = joined
+        try:
+            await socket.accept()
+            await _first(_listen(socket, hub, who, outbox), _speak(socket, outbox))
+        finally:
+            hub.leave(outbox)
+
+    async def pump() -> None:
+        due = time.monotonic()
+        while True:
+            for hub in hubs.values():
+                hub.turn()
+            due = max(due + 1 / RATE, time.monotonic())
+            await asyncio.sleep(due - time.monotonic())
+
+    @asynccontextmanager
+    async def life(_: Starlette) -> AsyncGenerator[None]:
+        pumping = asyncio.create_task(pump())
+        yield
+        pumping.cancel()
+        with suppress(asyncio.CancelledError):
+            await pumping
+
+    return Starlette(
+        lifespan=life,
+        routes=[
+            Route("/", page), Route("/assets/{name}", asset), Route("/api/rigs", rigs),
+            Route("/api/rigs/{name}/runs", runs), Route("/rigs/{name}/twin.js", script),
+            Route("/rigs/{name}/runs/{file}", result), WebSocketRoute("/live/{name}", live),
+        ],
+    )  # fmt: skip
+
+
+async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None:
+    """Do what a client asks for, until it is gone or asks for nonsense only."""
+    wrong, allowed, last = 0, SWIFTEST, time.monotonic()
+    with suppress(WebSocketDisconnect):
+        while wrong < PATIENCE:
+            received = await socket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            now = time.monotonic()
+            allowed, last = min(SWIFTEST, allowed + SWIFTEST * (now - last)), now
+            try:
+                message = read(received.get("text") or "")
+                if allowed < 1.0 and message.do != "stop":
+                    raise BadInput(f"at most {SWIFTEST:g} messages a second.")
+                allowed -= 1.0
+                if message.do == "poles":  # takes a while
+                    await asyncio.to_thread(obey, hub.station, who, message)
+                else:
+                    obey(hub.station, who, message)
+                wrong = 0
+            except BadInput as error:
+                wrong += 1
+                if not outbox.note(json.dumps({"type": "error", "sentence": _sentence(str(error))})):
+                    return
+        await socket.close(4400, "ten messages in a row were not understood")
+
+
+async def _speak(socket: WebSocket, outbox: Outbox) -> None:
+    with suppress(WebSocketDisconnect, RuntimeError):
+        while True:
+            content = await outbox.next()
+            await (socket.send_text(content) if isinstance(content, str) else socket.send_bytes(content))
+
+
+async def _first(*doing: Any) -> None:
+    """Do several things until the first of them ends."""
+    tasks = [asyncio.create_task(each) for each in doing]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _content(package: str, name: str) -> bytes | None:
+    place = files(package).joinpath(name)
+    return place.read_bytes() if place.is_file() else None
+
+
+def _result(folder: Path, name: str, path: str) -> Response:
+    """A log or a report that is listed."""
+    for run in listed(folder, name):
+        if run.get("log") == path:
+            return FileResponse(folder / f"{run['id']}.mcap", filename=f"{name}-{run['id']}.mcap")
+        if run.get("report") == path:  # a report has a policy of its own
+            headers = {"content-security-policy": "frame-ancestors 'self'"}
+            return FileResponse(folder / f"{run['id']}.html", media_type="text/html", headers=headers)
+    return _nothing()
+
+
+def _nothing() -> Response:
+    return PlainTextResponse("There is nothing here.", status_code=404)

@@ -1,0 +1,113 @@
+"""Those who look on at one rig: each sample is encoded once, and everybody is sent the same bytes."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import time
+from typing import Any
+
+from upright.bench.frames import frames, step_of
+from upright.bench.outbox import Outbox
+from upright.bench.station import Station
+
+SECOND = 1.0
+MOST = 256
+"""Clients of a rig at most."""
+_REMEMBERED = 4096
+
+
+class Hub:
+    """A rig and its clients, by who they are; one may have several connections."""
+
+    def __init__(self, station: Station) -> None:
+        self.station = station
+        self.clients: dict[Outbox, str] = {}
+        self._issued: dict[str, None] = {}  # who has been here, the oldest first
+        self._step = step_of(station.rig.model.limit, station.rig.model.converter)
+        self._next, self._late, self._answered, self._desk = 0, 0, 0, station.desk
+        self._shown: Any = None
+        self._when = 0.0
+
+    def join(self, me: str) -> tuple[str, Outbox] | None:
+        """A client, as who they were before where `me` is one that was issued here; None where there are too many."""
+        if len(self.clients) >= MOST:
+            return None
+        who = me if me in self._issued else secrets.token_urlsafe(16)
+        self._issued[who] = self._issued.pop(who, None)
+        while len(self._issued) > _REMEMBERED:
+            self._issued.pop(next(iter(self._issued)))
+        outbox = Outbox()
+        self.clients[outbox] = who
+        self.station.lease.back(who)
+        outbox.note(self._scene(who))
+        outbox.note(json.dumps(self.station.described(who)))
+        return who, outbox
+
+    def leave(self, outbox: Outbox) -> None:
+        """A connection has ended."""
+        who = self.clients.pop(outbox, "")
+        if who not in self.clients.values():
+            self.station.lease.gone(who)
+
+    def turn(self) -> None:
+        """Send what is new."""
+        self.station.beat()
+        self._samples()
+        self._answer()
+        station = self.station
+        now_so = (station.state, station.why, station.lease.holder, station.verdict, station.last.phase,
+                station.last.mode, station.last.faults)  # fmt: skip
+        now = time.monotonic()
+        if now_so != self._shown or now - self._when >= SECOND:
+            self._shown, self._when = now_so, now
+            for outbox, who in self.clients.items():
+                outbox.note(json.dumps(station.described(who)))
+
+    def _samples(self) -> None:
+        desk = self.station.desk
+        if desk is not self._desk:
+            self._desk, self._next, self._late, self._answered = desk, 0, 0, 0
+            self._scenes()
+        if desk is None:
+            return
+        self._next, rows = desk.since(self._next)
+        if not len(rows):
+            return
+        encoders = len(self.station.rig.model.per_unit)
+        for frame in frames(rows, encoders, self._step, self._late):
+            for outbox in self.clients:
+                outbox.frame(frame)
+        self._late = int(rows["late"][-1])
+
+    def _answer(self) -> None:
+        """What the loop made of the gains that were asked for."""
+        station = self.station
+        if station.desk is None:
+            return
+        number, tick, why = station.desk.answered
+        if number == self._answered:
+            return
+        self._answered, loop = number, station.requested
+        if why or loop is None:
+            self.everybody({"type": "error", "sentence": why})
+            return
+        station.loop = loop
+        poles = station.rig.poles(loop.K)
+        self.everybody({"type": "applied", "poles": poles, "K": loop.K[0].tolist(), "at_tick": tick})
+        self._scenes()
+
+    def _scenes(self) -> None:
+        for outbox, who in self.clients.items():
+            outbox.note(self._scene(who))
+
+    def _scene(self, who: str) -> str:
+        rig, loop = self.station.rig, self.station.loop
+        changed = {} if loop is None else {"poles": rig.poles(loop.K), "K": loop.K[0].tolist()}
+        return json.dumps({**rig.scene, **changed, "you": who})
+
+    def everybody(self, note: dict[str, Any]) -> None:
+        """Send a note to all."""
+        text = json.dumps(note)
+        for outbox in self.clients:
+            outbox.note(text)

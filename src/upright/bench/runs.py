@@ -1,0 +1,82 @@
+"""Runs that are over: their logs, their reports, and a list of both."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import re
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from upright.errors import UprightError
+from upright.files import replace_file
+from upright.realtime.session import RunEnd
+from upright.report.html import write_html
+from upright.running.chapter import run_chapter
+from upright.running.run import PreparedRun
+
+_STEM = re.compile(r"run(-\d+)?")
+
+
+def write_report(run: PreparedRun, end: RunEnd, started: float) -> str:
+    """Write the report of a run beside its log, and what a list says of it; the verdict."""
+    result = run.ended(end)
+    chapter = run_chapter(result)
+    write_html(result.log_path.with_suffix(".html"), chapter)
+    seconds = float(result.t[-1]) if result.t.size else 0.0
+    facts = {"started": started, "seconds": seconds, "verdict": chapter.verdict}
+    replace_file(result.log_path.with_suffix(".json"), json.dumps(facts).encode())
+    return chapter.verdict
+
+
+def listed(folder: Path, name: str) -> list[dict[str, Any]]:
+    """Runs of a rig whose report is written, the newest first."""
+    out: list[dict[str, Any]] = []
+    for path in sorted(folder.glob("run*.json")):
+        if _STEM.fullmatch(path.stem):
+            facts: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            there = {
+                key: f"/rigs/{name}/runs/{path.stem}.{end}"
+                for key, end in (("log", "mcap"), ("report", "html"))
+                if path.with_suffix(f".{end}").exists()
+            }
+            out.append({"id": path.stem, **facts, **there})
+    return sorted(out, key=lambda run: -run["started"])
+
+
+def in_own_process(task: Callable[..., str], *arguments: Any) -> str:
+    """What a task gives that would hold up everything else here; an error of ours is raised as it came.
+
+    Raises
+    ------
+    RuntimeError
+        When the process ends without an answer.
+    """
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_perform, args=(theirs, task, arguments), daemon=True, name="upright clerk")
+    process.start()
+    theirs.close()
+    try:
+        answer = ours.recv()
+    except EOFError:
+        raise RuntimeError("the process that was to write this ended without an answer") from None
+    finally:
+        process.join()
+        ours.close()
+    if isinstance(answer, UprightError):
+        raise answer
+    return str(answer)
+
+
+def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, ...]) -> None:
+    if hasattr(os, "nice"):
+        os.nice(10)  # what moves comes first
+    try:
+        pipe.send(task(*arguments))
+    except UprightError as error:
+        pipe.send(error)
+    pipe.close()

@@ -1,0 +1,133 @@
+"""The bench open for business: its address, its server, and everything at rest before it closes."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from upright.bench.app import application
+from upright.bench.guard import Guard
+from upright.bench.messages import LONGEST
+from upright.bench.rig import BenchRig, known_rig
+from upright.bench.station import Station
+from upright.errors import BadInput
+
+TWIN = 'kind = "twin"\nname = "furuta"\nmake = "furuta"\n'
+
+
+class Bench:
+    """Rigs in a browser, until it is closed; also as ``with up.bench() as bench:``.
+
+    Attributes
+    ----------
+    url : str
+        Its address; on a network with the token that everybody needs.
+    rigs : tuple of str
+        Names of its rigs.
+    folder : Path
+        Has the logs and reports of runs, a folder for each rig.
+    """
+
+    def __init__(
+        self, rigs: Sequence[BenchRig], folder: Path, *, port: int = 0, lan: bool = False, fifo: bool = True
+    ) -> None:
+        import uvicorn
+
+        self.folder, self.rigs = folder, tuple(rig.name for rig in rigs)
+        self.stations = [Station(rig, folder / rig.name, fifo=fifo) for rig in rigs]
+        self._socket = _bound(port, lan)
+        port = self._socket.getsockname()[1]
+        token = secrets.token_urlsafe(24) if lan else ""
+        address = _own_address() if lan else "127.0.0.1"
+        self.url = f"http://{address}:{port}/" + (f"?token={token}" if token else "")
+        names = {"127.0.0.1", "localhost", *((address, socket.gethostname().lower()) if lan else ())}
+        app: Any = Guard(application(self.stations), hosts=frozenset(f"{n}:{port}" for n in names), token=token)
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                app, loop="asyncio", http="h11", ws="websockets-sansio", ws_max_size=LONGEST, ws_max_queue=8,
+                ws_ping_interval=5.0, ws_ping_timeout=5.0, ws_per_message_deflate=False, log_level="warning",
+                access_log=False, server_header=False, timeout_graceful_shutdown=2, limit_concurrency=1024,
+            )
+        )  # fmt: skip
+        self._thread = threading.Thread(
+            target=self._server.run, kwargs={"sockets": [self._socket]}, name="bench", daemon=True
+        )
+        self._thread.start()
+        pause = threading.Event()
+        while not self._server.started and self._thread.is_alive():
+            pause.wait(0.01)
+
+    def close(self) -> None:
+        """Stop every rig, then the server."""
+        for station in self.stations:
+            station.stop("The bench was closed.")
+        for station in self.stations:
+            station.close()
+        self._server.should_exit = True
+        self._thread.join(10.0)
+        self._socket.close()
+
+    def wait(self, seconds: float | None = None) -> None:
+        """Wait until it is closed, or for so long [s]."""
+        self._thread.join(seconds)
+
+    def __enter__(self) -> Self:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Bench with {', '.join(self.rigs)} at {self.url}"
+
+
+def open_bench(
+    rigs: Sequence[Path], laws: Sequence[Path], folder: Path, *, port: int, lan: bool = False, fifo: bool = True
+) -> Bench:
+    """A bench of the rigs of some RIG.toml, each with its law; of a twin where there are none.
+
+    Raises
+    ------
+    BadInput
+        When a file cannot be used, two rigs have one name, or the port is taken.
+    """
+    if len(laws) > len(rigs):
+        raise BadInput(
+            f"there are more laws than rigs, {len(laws)} and {len(rigs)}; name each rig's own, in their order."
+        )
+    if not rigs:
+        folder.mkdir(parents=True, exist_ok=True)
+        rigs = [folder / "furuta.toml"]
+        rigs[0].write_text(TWIN, encoding="utf-8")
+    known = [known_rig(path, law, folder) for path, law in zip(rigs, [*laws, *[None] * len(rigs)], strict=False)]
+    names = [rig.name for rig in known]
+    if twice := sorted({n for n in names if names.count(n) > 1}):
+        raise BadInput(f"two rigs are called '{twice[0]}'; give each a name in its RIG.toml.")
+    return Bench(known, folder, port=port, lan=lan, fifo=fifo)
+
+
+def _bound(port: int, lan: bool) -> socket.socket:
+    bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind(("0.0.0.0" if lan else "127.0.0.1", port))
+    except OSError as error:
+        bound.close()
+        raise BadInput(f"port {port} cannot be had ({error.strerror}); name another with --port.") from None
+    return bound
+
+
+def _own_address() -> str:
+    """Address of this machine on its network; nothing is sent."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        try:
+            asking.connect(("192.0.2.1", 9))
+            return str(asking.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"

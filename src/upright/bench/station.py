@@ -1,0 +1,261 @@
+"""One rig of the bench: what it does, who may change that, and its stop, which stays until somebody arms it again."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from upright.basis import NOT_TRUSTED
+from upright.bench.lease import Lease
+from upright.bench.messages import ClientRequest
+from upright.bench.rig import HARDWARE, TWIN, BenchRig
+from upright.bench.runs import in_own_process, write_report
+from upright.errors import BadInput, UprightError, nearest
+from upright.live.twin import Loop
+from upright.realtime.desk import Desk
+from upright.realtime.process import DEAF, run_in_process
+from upright.realtime.session import RunEnd, RunState
+from upright.rigs.board import SENTENCES
+from upright.running.rig import NEAR
+from upright.running.run import RunRequest, prepared
+
+IDLE, STARTING, RUNNING, STOPPED, ENDED = "idle", "starting", "running", "stopped", "ended"
+LONGEST, USUAL = 3600.0, 600.0
+"""Of a run [s]."""
+TILT, ASIDE = math.radians(3.0), 0.003
+"""How far a twin's hand lets go from what is held, where nobody says [rad, m]."""
+FASTEST = 20.0
+"""Tap that a twin's hand gives at most [rad/s or m/s]."""
+
+
+class Station:
+    """A rig, its runs and its operator.
+
+    Attributes
+    ----------
+    state, why : str
+        One of `IDLE`, `STARTING`, ...; why it is stopped, as a sentence.
+    verdict : str
+        Of the last run, as soon as its report is written.
+    last : RunState
+        How the run goes, some twenty times a second.
+    over : bool
+        Whether no process has the rig.
+    loop, requested : Loop or None
+        The law that runs as state feedback, and the one that was asked for last.
+    desk : Desk or None
+        Of the run that goes on, or of the last one.
+    """
+
+    desk: Desk | None
+    loop: Loop | None
+    requested: Loop | None
+    _thread: threading.Thread | None
+
+    def __init__(self, rig: BenchRig, folder: Path, *, fifo: bool = True) -> None:
+        self.rig, self.folder, self.lease = rig, folder, Lease()
+        self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
+        self.last, self.over, self.desk = RunState(phase=""), True, None
+        self.loop, self.requested = rig.loop, None
+        self._accepted, self._fifo = "", fifo
+        self._lock, self._thread = threading.Lock(), None
+        self._beat = time.monotonic()
+
+    def beat(self) -> None:
+        """Say that somebody can stop it; a run whose server does not answer any more ends by itself."""
+        self._beat = time.monotonic()
+        if self.lease.lapsed() and self.state in (STARTING, RUNNING):
+            self.stop("The operator is gone.")
+
+    def start(self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "") -> None:
+        """Begin a run.
+
+        Raises
+        ------
+        BadInput
+            When it may not be started now, or so.
+        """
+        self._operated(who)
+        if self.state == STOPPED:
+            raise BadInput(f"{self.rig.name} is stopped: {self.why} Arm it again first.")
+        if self.state not in (IDLE, ENDED):
+            raise BadInput(f"{self.rig.name} runs already.")
+        if not 0 < seconds <= LONGEST:
+            raise BadInput(f"a run takes more than 0 and at most {LONGEST:g} s, got {seconds:g} s.")
+        if self.rig.kind == HARDWARE and self.rig.basis.level == NOT_TRUSTED and not accept.strip():
+            raise BadInput(f"its model is not trusted: {self.rig.basis.sentence} Say why it runs all the same.")
+        request = RunRequest(
+            rig=self.rig.rig_path, law=self.rig.law_path, seconds=seconds, tilt=self._tilt(start), accept=accept
+        )
+        self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
+        self.last, self.desk, self.loop = RunState(phase="starting"), Desk(), self.rig.loop
+        self.state, self.over = STARTING, False
+        # the system ends the loop's process with the thread that started it, which waits for it
+        self._thread = threading.Thread(target=self._run, args=(request, self.desk), name=f"run of {self.rig.name}")
+        self._thread.start()
+
+    def stop(self, why: str) -> None:
+        """Stop it, whatever it does, until somebody arms it again."""
+        with self._lock:
+            if self.desk is not None:
+                self.desk.stop()
+            if self.state != STOPPED:
+                self.state, self.why = STOPPED, why
+
+    def rearm(self, who: str) -> None:
+        """Let it be started again.
+
+        Raises
+        ------
+        BadInput
+            When they do not operate it, or it has not come to its end.
+        """
+        self._operated(who)
+        if not self.over:
+            raise BadInput(f"{self.rig.name} is on its way to rest; arm it again when it is there.")
+        with self._lock:
+            if self.state == STOPPED:
+                self.state, self.why = IDLE, ""
+
+    def tap(self, who: str, coordinate: str, speed: float) -> None:
+        """Tap a twin."""
+        self._operated(who)
+        names = [c.name for c in self.rig.model.plant.coordinates]
+        if self.rig.kind != TWIN:
+            raise BadInput("a tap is for a twin; tap the rig by hand.")
+        if coordinate not in names:
+            raise BadInput(f"it has no coordinate '{coordinate[:40]}'; {nearest(coordinate[:40], names)}")
+        if abs(speed) > FASTEST:
+            raise BadInput(f"a tap adds at most {FASTEST:g} to a speed.")
+        self._running().tap(names.index(coordinate), speed)
+
+    def poles(self, who: str, poles: Sequence[complex], *, confirm: bool = False) -> None:
+        """Ask for other gains, which the loop's supervisor accepts or refuses."""
+        self._operated(who)
+        if self.rig.kind == HARDWARE and not confirm:
+            raise BadInput("this changes what drives a rig that can really move; confirm it.")
+        if self.rig.basis.level == NOT_TRUSTED and not self._accepted:
+            raise BadInput(f"its model is not trusted: {self.rig.basis.sentence}")
+        desk, loop = self._running(), self.rig.with_poles(poles)
+        if not desk.change(loop.law):
+            raise BadInput("the last change is not answered yet.")
+        self.requested = loop
+
+    def follow(self, who: str, value: float) -> None:
+        """Give the law another reference."""
+        self._operated(who)
+        if not self.rig.follows:
+            raise BadInput("its law follows no reference.")
+        most = self.rig.model.travel
+        if abs(value) > min(most, 1e3):
+            raise BadInput(f"a reference lies within its travel of {most:.4g}.")
+        self._running().follow(value)
+
+    def close(self) -> None:
+        """Stop it, and wait until it is at rest and its log is whole."""
+        self.stop("The bench was closed.")
+        if self._thread is not None:
+            self._thread.join(30.0)
+
+    def _operated(self, who: str) -> None:
+        if self.lease.holder != who:
+            raise BadInput("somebody else operates it." if self.lease.holder else "take it first.")
+
+    def _running(self) -> Desk:
+        if self.state != RUNNING or self.desk is None:
+            raise BadInput(f"{self.rig.name} does not run.")
+        return self.desk
+
+    def _tilt(self, start: Sequence[float]) -> float:
+        if self.rig.kind != TWIN:
+            return 0.0
+        coordinates = self.rig.model.plant.coordinates
+        angle = coordinates[-1].unit == "rad"
+        if not start:
+            return TILT if angle else ASIDE
+        if len(start) != 2 * len(coordinates) or any(x for i, x in enumerate(start) if i != len(start) - 2):
+            raise BadInput(f"a twin's hand lets go of {coordinates[-1].name} at rest, with all other states at zero.")
+        if angle and abs(start[-2]) > NEAR:
+            raise BadInput(f"a run starts within {math.degrees(NEAR):.3g} degrees of what is held.")
+        return start[-2]
+
+    def _run(self, request: RunRequest, desk: Desk) -> None:
+        started = time.time()
+        try:
+            run = prepared(request, self.folder)
+            order = replace(run.order, wall=True, fifo=self._fifo)
+            end = run_in_process(order, watch=self._watch, desk=desk)
+        except UprightError as error:
+            self._ended(str(error))
+            return
+        except BaseException:
+            self._ended("The run failed by a bug; see what the server printed.")
+            raise
+        self._ended(end.stopped, end)
+        try:
+            self.verdict = in_own_process(write_report, run, end, started)
+        except UprightError as error:
+            self.verdict = f"There is no report: {error}"
+
+    def _ended(self, why: str, end: RunEnd | None = None) -> None:
+        with self._lock:
+            self.over = True
+            if end is not None:
+                self.last = replace(self.last, late=end.late, tick=end.ticks, faults=end.faults)
+            if self.state != STOPPED:
+                self.state, self.why = (STOPPED, why) if why else (ENDED, "")
+
+    def _watch(self, state: RunState) -> str:
+        self.last = state
+        with self._lock:
+            if self.state == STARTING and state.phase == "running":
+                self.state = RUNNING
+        gone = time.monotonic() - self._beat
+        return f"The bench's server has not answered for {DEAF:g} s." if gone > DEAF else ""
+
+    def described(self, who: str) -> dict[str, Any]:
+        """How it goes, for one client, as JSON holds it."""
+        holder, last = self.lease.holder, self.last
+        return {
+            "type": "state", "state": self.state, "why": self.why, "phase": last.phase,
+            "operator": "nobody" if not holder else "you" if holder == who else "another",
+            "time": last.time, "tick": last.tick, "late": last.late, "mode": last.mode.name,
+            "faults": [text for fault, text in SENTENCES.items() if fault in last.faults],
+            "seconds": self.seconds, "verdict": self.verdict,
+        }  # fmt: skip
+
+
+def obey(station: Station, who: str, message: ClientRequest) -> None:
+    """Do what a client asks for, where it may.
+
+    Raises
+    ------
+    BadInput
+        Why not.
+    """
+    fields = dict(message.fields)
+    match message.do:
+        case "operate":
+            if not station.lease.take(who):
+                raise BadInput("somebody else operates it.")
+        case "release":
+            station.lease.give(who)
+        case "stop":
+            station.stop(
+                "Stopped by its operator." if station.lease.holder == who else "Stopped by somebody who watches."
+            )
+        case "rearm":
+            station.rearm(who)
+        case "start":
+            station.start(who, **fields)
+        case "tap":
+            station.tap(who, **fields)
+        case "poles":
+            station.poles(who, **fields)
+        case _:
+            station.follow(who, **fields)
