@@ -7,7 +7,7 @@ import pytest
 
 from upright.experiments.frequency_1b.run import FrequencyRun
 from upright.experiments.frequency_1b.sweeps import stepped_sine
-from upright.experiments.stand.known import bench, model_of
+from upright.experiments.stand.known import bench_values, model_of
 from upright.identification.frequency.answer import explain
 from upright.identification.frequency.response import FrequencyResponse
 from upright.rig.makes import MAKES, make_rig
@@ -30,7 +30,7 @@ def done(hurried, tmp_path_factory):
         omega=omega, response=answer, outputs=("x", "theta"), units=("m", "rad", "V"),
         variance=1e-6 * np.abs(answer) ** 2, dry=4 / (np.pi * np.abs(answer) * omega[:, None]),
     )  # fmt: skip
-    explained = explain(model_of(make, bench(rig, make), make.bench), "hanging", data)
+    explained = explain(model_of(make, bench_values(rig, make), make.bench), "hanging", data)
     return FrequencyRun(
         rig=rig, make=make, sweep=hurried, answer=explained, folder=tmp_path_factory.mktemp("told"), kind="sines",
         seconds=1.0,

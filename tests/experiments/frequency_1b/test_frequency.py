@@ -27,7 +27,7 @@ from upright.experiments.frequency_1b.sweeps import (
     grid,
     sines,
 )
-from upright.experiments.stand.known import Known, bench
+from upright.experiments.stand.known import Known, bench_values
 from upright.identification.frequency.answer import key_value
 from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
 from upright.identification.model.fit import Estimate, Pole
@@ -391,7 +391,7 @@ def test_a_twin_is_swept_as_it_was_asked_and_what_was_weighed_takes_the_place_of
     parameters = noted["model"].parameters
     assert (parameters["J_d"].value, parameters["J_d"].estimate) == (0.01, False)
     assert parameters["J_d"].uncertainty == pytest.approx(1e-4)
-    for name, value in bench(rig, MAKES["furuta"]).items():
+    for name, value in bench_values(rig, MAKES["furuta"]).items():
         if name != "J_d":
             assert parameters[name].value == value
             assert parameters[name].uncertainty == pytest.approx(MAKES["furuta"].bench[name] * value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from upright.experiments.stand.known import bench, model_of
+from upright.experiments.stand.known import bench_values, model_of
 from upright.rig.makes import MAKES, make_rig
 
 
@@ -14,12 +14,12 @@ def test_a_bench_errs_by_its_tolerance_from_rig_to_rig_and_not_on_the_rig_as_des
     """Normal, over 300 rigs: mean within 4/sqrt(300), scatter within 4/sqrt(600)."""
     make = MAKES[key]
     nominal = make_rig(key)
-    assert bench(nominal, make) == {n: nominal.plant.parameters()[n] for n in make.bench}
+    assert bench_values(nominal, make) == {n: nominal.plant.parameters()[n] for n in make.bench}
     off = []
     for seed in range(1, 301):
         rig = make_rig(key, seed)
         true = rig.plant.parameters()
-        off.append([(bench(rig, make)[n] / true[n] - 1) / s for n, s in make.bench.items() if s and true[n]])
+        off.append([(bench_values(rig, make)[n] / true[n] - 1) / s for n, s in make.bench.items() if s and true[n]])
     assert np.abs(np.mean(off, axis=0)).max() < 4 / np.sqrt(300)
     assert np.abs(np.std(off, axis=0) - 1).max() < 4 / np.sqrt(600)
 

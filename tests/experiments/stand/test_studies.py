@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from tests.experiments.rigs import OWN, made
-from upright.experiments.stand.known import Known, bench, model_of
+from upright.experiments.stand.known import Known, bench_values, model_of
 from upright.experiments.stand.live import live_stand
 from upright.experiments.stand.studies import write_study
 from upright.rig.makes import MAKES, make_rig
@@ -83,7 +83,7 @@ def test_a_twin_of_a_make_starts_from_its_design_and_what_its_bench_says(tmp_pat
     stand = made(tmp_path, f'kind = "twin"\nmake = "furuta"\nseed = {seed}\n')
     study = written(stand, tmp_path / "1b" / "study.toml")
     make, rig = MAKES["furuta"], make_rig("furuta", seed)
-    start = model_of(make, bench(rig, make), make.bench).parameters
+    start = model_of(make, bench_values(rig, make), make.bench).parameters
     assert study["rig"]["vendor"] == make.vendor
     entries = {**study["parameters"], **{f"actuator.{n}": v for n, v in study["actuator"].items()}}
     assert set(entries) == set(start)
