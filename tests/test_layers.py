@@ -61,7 +61,7 @@ experiments.regulation_2
 experiments.swing_up_2b experiments.tracking_3 experiments.free_swing_4
 experiments
 exports
-bench
+browser
 verbs
 views
 cli
@@ -98,8 +98,8 @@ DOORS = {
     "typst": "report",
     "pint": "units",
     "typer": "cli",
-    "starlette": "bench",
-    "uvicorn": "bench",
+    "starlette": "browser",
+    "uvicorn": "browser",
     "mcap": "logs",
     "zstandard": "logs",
     "serial": "line",

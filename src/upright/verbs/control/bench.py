@@ -11,7 +11,7 @@ from upright.verbs.pages import folder
 from upright.verbs.values import path_of, paths
 
 if TYPE_CHECKING:
-    from upright.bench.serve import Bench
+    from upright.browser.serve import Bench
     from upright.files import PathLike
 
 
@@ -86,7 +86,7 @@ def bench(
     laws = [path_of(each, "the law of a rig") for each in paths(law)]
     kept = folder(out)
     try:
-        from upright.bench.serve import open_bench
+        from upright.browser.serve import open_bench
     except ImportError as error:
         raise BadInput(
             f"the bench needs the bench extra ({error.name} is not installed): pip install 'upright[bench]'."

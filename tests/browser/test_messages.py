@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from upright.bench.messages import TABLE, read
+from upright.browser.messages import TABLE, read
 from upright.errors import BadInput
 
 JSON = st.recursive(

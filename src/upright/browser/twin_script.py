@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from upright.bench.rig import BenchRig
+from upright.browser.rig import BenchRig
 from upright.control.preflight import Task
 from upright.errors import BadInput
 from upright.live.page import in_script

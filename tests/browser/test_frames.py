@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from upright.bench.frames import frames, step_of
+from upright.browser.frames import frames, step_of
 from upright.realtime.desk import ROW
 
 

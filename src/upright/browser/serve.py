@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
-from upright.bench.app import application
-from upright.bench.guard import Guard
-from upright.bench.messages import LONGEST
-from upright.bench.rig import BenchRig, known_rig
-from upright.bench.station import Station
+from upright.browser.app import application
+from upright.browser.guard import Guard
+from upright.browser.messages import LONGEST
+from upright.browser.rig import BenchRig, known_rig
+from upright.browser.station import Station
 from upright.errors import BadInput
 
 TWIN = 'kind = "twin"\nname = "furuta"\nmake = "furuta"\n'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from upright.bench.lease import PATIENCE, Lease
+from upright.browser.lease import PATIENCE, Lease
 
 
 def lease():

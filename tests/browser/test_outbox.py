@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from upright.bench.outbox import FRAMES, NOTES, Outbox
+from upright.browser.outbox import FRAMES, NOTES, Outbox
 
 
 def test_the_newest_frames_wait_and_notes_come_first():

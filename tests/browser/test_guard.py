@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from upright.bench.guard import COOKIE, HEADERS, Guard
+from upright.browser.guard import COOKIE, HEADERS, Guard
 
 HOST = "127.0.0.1:8431"
 

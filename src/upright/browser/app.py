@@ -18,12 +18,12 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
-from upright.bench.hub import Hub
-from upright.bench.messages import read
-from upright.bench.outbox import Outbox
-from upright.bench.runs import in_own_process, listed
-from upright.bench.station import Station, obey
-from upright.bench.twin_script import twin_script
+from upright.browser.hub import Hub
+from upright.browser.messages import read
+from upright.browser.outbox import Outbox
+from upright.browser.runs import in_own_process, listed
+from upright.browser.station import Station, obey
+from upright.browser.twin_script import twin_script
 from upright.errors import BadInput, UprightError
 
 RATE = 40.0
@@ -40,8 +40,8 @@ SHARED = {
     "uPlot.js": ("upright.report.interactive", "uplot/uPlot.iife.min.js", SCRIPT),
     "uPlot.css": ("upright.report.interactive", "uplot/uPlot.min.css", STYLE),
     "tokens.css": ("upright.report", "templates/tokens.css", STYLE),
-    "bench.js": ("upright.bench", "page/bench.js", SCRIPT),
-    "bench.css": ("upright.bench", "page/bench.css", STYLE),
+    "bench.js": ("upright.browser", "page/bench.js", SCRIPT),
+    "bench.css": ("upright.browser", "page/bench.css", STYLE),
 }
 """What the page is made of, by its name in an address: package, file, type. The scripts are those of the reports."""
 NOT_BUILT = (
@@ -56,7 +56,7 @@ def application(stations: Sequence[Station]) -> Starlette:
     scripts: dict[str, asyncio.Task[str]] = {}
 
     async def page(_: Request) -> Response:
-        content = _content("upright.bench", "page/index.html")
+        content = _content("upright.browser", "page/index.html")
         return PlainTextResponse(NOT_BUILT) if content is None else Response(content, media_type="text/html")
 
     async def asset(request: Request) -> Response:

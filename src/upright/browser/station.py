@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from upright.basis import NOT_TRUSTED
-from upright.bench.lease import Lease
-from upright.bench.messages import ClientRequest
-from upright.bench.rig import HARDWARE, TWIN, BenchRig
-from upright.bench.runs import in_own_process, write_report
+from upright.browser.lease import Lease
+from upright.browser.messages import ClientRequest
+from upright.browser.rig import HARDWARE, TWIN, BenchRig
+from upright.browser.runs import in_own_process, write_report
 from upright.errors import BadInput, UprightError, nearest
 from upright.live.twin import Loop
 from upright.realtime.desk import Desk

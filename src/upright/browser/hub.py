@@ -7,9 +7,9 @@ import secrets
 import time
 from typing import Any
 
-from upright.bench.frames import frames, step_of
-from upright.bench.outbox import Outbox
-from upright.bench.station import Station
+from upright.browser.frames import frames, step_of
+from upright.browser.outbox import Outbox
+from upright.browser.station import Station
 
 SECOND = 1.0
 MOST = 256
