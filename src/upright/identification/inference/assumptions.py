@@ -185,7 +185,7 @@ def _moves(best: Optimum, assumed: Sequence[Parameter], places: Sequence[int]) -
     wider = replace(problem, unknowns=[*problem.unknowns, *extra], steps=np.concatenate([problem.steps, steps]))
     z = np.concatenate([x, [u.coordinate(u.value) for u in extra]])
     wider.settle_steps(z)
-    normal = wider.normal(z)  # at the steps that were chosen, not near them: ties are told apart by exponents
+    normal = wider.normal(z)  # at the steps that were chosen, not near them: exponents distinguish ties
     sizes = np.array([abs(p.value) for p in assumed])
     if not math.isfinite(normal.cost):
         return None, sizes
