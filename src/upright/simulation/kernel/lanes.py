@@ -190,13 +190,17 @@ def controller(w: Writer) -> None:
     (_law if isinstance(f.loop, Structure) else _rule)(w)
     if f.dynamic:
         w.depth -= 1
+        w.add("_now = _k % _nbuf")
         w.lanes()
         for j in range(p.nu):
             place = f"(_slot * {p.nu} + {j} + {len(p.rows)}) * {w.width} + _i"
-            w.add("_slot = _k % _nbuf", f"W[{place}] = {{ua{j}}}")
-            for name, back in (("cn", "int({di})"), ("co", "int({di}) - 1")):
-                gap = back if name == "cn" else "int({di}) + 1"
-                w.add(f"_slot = (_k - ({gap})) % _nbuf", f"_c = W[{place}]", f"_c = _c if _k >= {gap} else 0.0")
+            w.add("_slot = _now", f"W[{place}] = {{ua{j}}}")
+            for name, gap in (("cn", "int({di})"), ("co", "int({di}) + 1")):
+                # commands stand in a ring; a remainder would cost more than all else here
+                w.add(
+                    f"_slot = _now - ({gap})", "_slot = max(_slot + _nbuf if _slot < 0 else _slot, 0)",
+                    f"_c = W[{place}]", f"_c = _c if _k >= {gap} else 0.0",
+                )  # fmt: skip
                 commanded(w, j, name[1])
                 w.add(*_force_lines(w, j, f"{{{name}{j}}}", "_c"))
 

@@ -262,7 +262,11 @@ class Expressions:
             if out is None:
                 raise Unsupported(f"'{name}' returns nothing")
             return out
-        return self._built_in(name, [self.value(a) for a in node.args])
+        match name, node.args:
+            case "ldexp", [x, ast.Call(func=ast.Name(id="int"), args=[power], keywords=[])]:
+                return self.write.scaled_by_whole(self.value(x), self.value(power))
+            case _:
+                return self._built_in(name, [self.value(a) for a in node.args])
 
     def _built_in(self, name: str, args: list[Operand]) -> Operand:
         w = self.write

@@ -17,7 +17,7 @@ KERNEL, THREAD = "lanes", "thread"
 
 _FIRST, _LAST, _TOTAL, _WORK, _ADDRESS = "_b0", "_b1", "_total", "W", "_events"
 
-_NATIVE = ("llvm.fabs.", "llvm.floor.", "llvm.sqrt.", "llvm.rint.", "llvm.memset.")
+_NATIVE = ("llvm.fabs.", "llvm.floor.", "llvm.trunc.", "llvm.sqrt.", "llvm.rint.", "llvm.memset.")
 """What a GPU does by itself of all that LLVM knows by name."""
 
 _PLACES = ("ctaid", "ntid", "tid")

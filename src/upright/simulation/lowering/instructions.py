@@ -47,7 +47,7 @@ _CONVERSIONS: dict[tuple[Kind, Kind], str] = {
     ("bool", "float"): "uitofp",
     ("float", "int"): "fptosi",
 }
-_IN_VECTORS = ("floor", "fabs", "sqrt")
+_IN_VECTORS = ("floor", "fabs", "sqrt", "trunc")
 LARGEST_POWER = 16
 """Up to this whole exponent powers are products."""
 
@@ -429,10 +429,25 @@ class Instructions:
     def scaled(self, x: Operand, n: Operand) -> Value:
         """X times 2 to the power of the whole number n, between -1022 and 1023."""
         n = self.number(self.vector(n))
-        t = INTS if n.type.lanes else INT
-        bits = self.binary("<<", self.binary("+", self.convert(n, t), self.convert(whole(1023), t)),
-                           self.convert(whole(52), t))  # fmt: skip
-        wanted = FLOATS if t.lanes else FLOAT
+        return self._times_power(x, self.number(self.convert(n, INTS if n.type.lanes else INT)))
+
+    def scaled_by_whole(self, x: Operand, power: Operand) -> Value:
+        """X times 2 to the power of a float without its fraction, between -1022 and 1023.
+
+        Vectors of floats become whole numbers one lane at a time on most processors. Beside 1.5 2^52 the last digits of
+        a float are the whole number.
+        """
+        n = self.number(self.vector(power))
+        reals, t = (FLOATS, INTS) if n.type.lanes else (FLOAT, INT)
+        n = self.intrinsic("trunc", self.number(self.convert(n, reals)))
+        beside = self.number(self.convert(real(1.5 * 2.0**52), reals))
+        shifted = self.emit(reals, f"fadd {self.named(reals)} {n.text}, {beside.text}")  # rearranged it would be n
+        return self._times_power(x, self.emit(t, f"bitcast {self.named(reals)} {shifted.text} to {self.named(t)}"))
+
+    def _times_power(self, x: Operand, n: Value) -> Value:
+        """X times 2 to the power of a whole number of which the last 12 binary digits count."""
+        wanted, t = FLOATS if n.type.lanes else FLOAT, n.type
+        bits = self.binary("<<", self.binary("+", n, self.convert(whole(1023), t)), self.convert(whole(52), t))
         factor = self.emit(wanted, f"bitcast {self.named(t)} {self.packed(bits)} to {self.named(wanted)}")
         return self.binary_number("*", x, factor)
 
