@@ -84,6 +84,12 @@ def figures(value: float, stderr: float) -> int:
     return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2, 2), 8)
 
 
+def two_figures(value: float) -> str:
+    """Two figures, of what is large without powers of ten: ``0.23``, ``4.7``, ``100``, ``3100``."""
+    text = f"{value:.2g}"
+    return f"{float(text):.0f}" if 99.5 <= abs(value) < math.inf else text
+
+
 def with_unit(value: float, unit: str = "", digits: int = 3) -> str:
     """A number with its unit, ``0.35 m``; a pure number ("" or "1") has none."""
     return f"{value:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")

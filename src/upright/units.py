@@ -122,6 +122,12 @@ def same_dimension(unit: str, other: str) -> bool:
     return _si(unit)[1] == _si(other)[1]
 
 
+def denominator(unit: str) -> str:
+    """What a gain is per, "" where it is per nothing: V of ``N m/V``, m/s^2 of ``N/(m/s^2)``."""
+    inner = unit.rstrip()
+    return inner[:-1].rpartition("/(")[2] if inner.endswith(")") else inner.rpartition("/")[2] if "/" in inner else ""
+
+
 def known(unit: str) -> bool:
     """Whether `unit` can be read."""
     try:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from upright.errors import BadInput
+from upright.quantities import two_figures
 from upright.records import Array
 
 RESTING = 1 / 3
@@ -159,12 +160,14 @@ def cycle(t: Array, x: Array, step: float = 0.0) -> Cycle | None:
 
 def of_limit(share: float, bound: str = "") -> str:
     """A share of the limit in words, a bound such as "at most " before it."""
-    return "less than 0.1 % of the limit" if share < 1e-3 else f"{bound}{100 * share:.2g} % of the limit"
+    return "less than 0.1 % of the limit" if share < 1e-3 else f"{bound}{two_figures(100 * share)} % of the limit"
 
 
 def shown(effort: RestEffort, limit: float, unit: str) -> str:
     """The command at rest in words, as what comes after "the command at rest"."""
-    described = f"has an rms of {of_limit(effort.rms)} and peaks at {effort.peak * limit:.2g} of {limit:g} {unit}"
+    described = (
+        f"has an rms of {of_limit(effort.rms)} and peaks at {two_figures(effort.peak * limit)} of {limit:g} {unit}"
+    )
     if effort.command is not None:
         described += f", every {_seconds(effort.command.period)}"
     return (

@@ -90,6 +90,7 @@ def _lasting(design: Designed, poles: Roots, digits: int) -> str:
 def _per(command: str, unit: str) -> str:
     if unit == "1":
         return command
+    command = f"({command})" if "/" in command else command
     below = f"({unit})" if "/" in unit else unit
     return raised(f"{command} s/{unit.removesuffix('/s')}" if unit.endswith("/s") else f"{command}/{below}")
 

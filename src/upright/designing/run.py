@@ -33,6 +33,7 @@ from upright.gains.loop import closed, command_noise, swing
 from upright.gains.lqr import least_cost, linear_motion
 from upright.gains.requests import Roots, conjugate_poles, poles_of, written
 from upright.laws import Law
+from upright.quantities import two_figures
 from upright.records import Array
 from upright.rig import Rig
 from upright.rig.completion import completed
@@ -221,7 +222,7 @@ class Designed:
             out.append(f"the command at rest {shown(self.holding.effort, limit, self.rig.unit)}")
         elif rounding > QUIET_RMS:
             out.append(
-                f"the rounding of encoders gives the command an rms of {100 * rounding:.2g} % of the limit "
+                f"the rounding of encoders gives the command an rms of {two_figures(100 * rounding)} % of the limit "
                 f"({100 * QUIET_RMS:.0f} % is quiet)"
             )
         return out

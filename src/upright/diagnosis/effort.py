@@ -14,6 +14,7 @@ from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.diagnosis.forces import ForceBalance
 from upright.diagnosis.motion import SmoothedMotion, driven_row, simplest
 from upright.diagnosis.sensors import clipped
+from upright.quantities import two_figures
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT
 from upright.records import Array
 from upright.signals.trips import TripRegression
@@ -127,8 +128,8 @@ def _limited(case: Case) -> Iterator[Finding]:
             kind="saturation",
             columns=(c.name,),
             severity="warning" if share > 0.005 else "note",
-            sentence=f"'{c.name}' is cut off at {ends} {unit} for {100 * share:.2g} % of the samples: the drive is"
-            " at its limit, where a controller no longer acts.".replace("  ", " "),
+            sentence=f"'{c.name}' is cut off at {ends} {unit} for {two_figures(100 * share)} % of the samples:"
+            " the drive is at its limit, where a controller no longer acts.".replace("  ", " "),
             evidence={"share [%]": 100 * share, f"limit [{unit or 1}]": limit},
             advice="Tell the model the limit; ask for less where linear behaviour is wanted.",
             key=f"[actuator]\nlimit = {limit:.6g}",

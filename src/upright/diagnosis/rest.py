@@ -10,6 +10,7 @@ import numpy as np
 from upright.diagnosis.case import HELD, Case, column_unit, tells_speed
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.physics.equations import small_motions
+from upright.quantities import two_figures
 from upright.records import Array
 from upright.signals.stretches import pieces, turning_points
 
@@ -31,7 +32,7 @@ def _creep(case: Case) -> Iterator[Finding]:
             kind="creep",
             columns=(c.name,),
             severity="warning",
-            sentence=f"'{c.name}' moves {span:.4g} {unit}, {100 * span / beside:.2g} % of the motion"
+            sentence=f"'{c.name}' moves {span:.4g} {unit}, {two_figures(100 * span / beside)} % of the motion"
             f" of '{largest.name}': a body that was held, but creeps.".replace("  ", " "),
             evidence={f"range [{unit or 1}]": span, f"beside [{unit or 1}]": beside},
             advice="Feed its measured motion in instead of locking it.",
@@ -64,7 +65,8 @@ def _drift(case: Case) -> Iterator[Finding]:
                 columns=(c.name,),
                 severity="note",
                 sentence=f"'{c.name}' comes to rest {off:.4g} {unit} apart from where it lay before"
-                f" ({100 * off / span:.2g} % of its range): dry friction holds it off centre, or the zero drifts.",
+                f" ({two_figures(100 * off / span)} % of its range): dry friction holds it off centre,"
+                " or the zero drifts.",
                 evidence={f"apart [{unit or 1}]": off, "of the range [%]": 100 * off / span},
                 advice="Ask for Coulomb friction, or an offset per run.",
                 key=f'unknown = ["initial", "offset.{case.coordinate(c.name)}"]',

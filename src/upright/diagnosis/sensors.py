@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from upright.diagnosis.case import Case, column_unit, tells_speed, tells_time
 from upright.diagnosis.findings import Finding
+from upright.quantities import two_figures
 from upright.readers.inspection import Column
 from upright.records import Array, Record
 from upright.signals.spikes import REACH, Jumps, jumps
@@ -150,8 +151,8 @@ def _limited(case: Case, c: Column, x: Array) -> Iterator[Finding]:
         kind="saturation",
         columns=(c.name,),
         severity="warning",
-        sentence=f"'{c.name}' is cut off at {ends} for {100 * share:.2g} % of the samples: the sensor reaches its"
-        " limit, or the body a stop.",
+        sentence=f"'{c.name}' is cut off at {ends} for {two_figures(100 * share)} % of the samples: the sensor reaches"
+        " its limit, or the body a stop.",
         evidence={"share [%]": 100 * share},
         advice="Use a window without these spans.",
         panels=case.over_time(c.name),

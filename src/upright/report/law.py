@@ -9,6 +9,7 @@ import numpy as np
 
 from upright.closed_loop import Recovery
 from upright.closed_loop.recovery import TriedStructure, loop_recovered, loop_written
+from upright.quantities import two_figures
 from upright.records import Array, Record
 from upright.report.drawing import BLUE, GREY, PALE, VERMILLION, decimated, figure, styled
 from upright.report.page import Chapter, Part, Picture, Points, Step, Table
@@ -61,7 +62,9 @@ def _circumstances(record: Record, recovery: Recovery) -> list[str]:
     sentences = [f"Evaluated {rate}; {'a sample late' if law.delay else 'answers at the same sample'}."]
     if recovery.saturated:
         sums = " (its sum stands still meanwhile)" if law.windup == "hold" else ""
-        sentences.append(f"Limited to {law.limit:.6g}{unit} in {100 * recovery.saturated:.2g} % of the rows{sums}.")
+        sentences.append(
+            f"Limited to {law.limit:.6g}{unit} in {two_figures(100 * recovery.saturated)} % of the rows{sums}."
+        )
     return sentences
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from upright.quantities import two_figures
 from upright.readers.inspection import Column, Inspection
 from upright.records import Record
 from upright.report.drawing import CYCLE, GREY, decimated, figure, hide_inner_times, styled
@@ -84,7 +85,7 @@ def _remarks(column: Column) -> list[str]:
     if column.drive:
         for share, level in ((column.low_share, column.low), (column.high_share, column.high)):
             if share and not column.stepwise:
-                remarks.append(f"at {level:.4g} for {100 * share:.2g} % of the samples (saturated?)")
+                remarks.append(f"at {level:.4g} for {two_figures(100 * share)} % of the samples (saturated?)")
     if column.turns:
         remarks.append(f"offset of {column.turns} turns (2 pi each)")
     return remarks

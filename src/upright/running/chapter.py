@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from upright.control.effort import RestEffort, shown
+from upright.quantities import two_figures
 from upright.realtime.jitter import Jitter
 from upright.report.page import Chapter, Facts, KeyNumber, Part, Picture, Step, Table, resting_on
 from upright.report.run import draw_run
@@ -25,7 +26,7 @@ def run_chapter(run: RigRun) -> Chapter:
     facts: list[tuple[str, str]] = []
     if end.about is not None:
         facts.append(("rig", f"{end.about.name}, a tick every {1e3 * end.about.period:.4g} ms"))
-    share = f"{100 * end.late / end.ticks:.2g} %" if end.ticks else "none"
+    share = f"{two_figures(100 * end.late / end.ticks)} %" if end.ticks else "none"
     facts += [("ticks", f"{end.ticks}, {end.late} late ({share})"),
               ("log", f"{run.log_path.name}: {end.rows} rows, {end.dropped} dropped")]  # fmt: skip
     if run.unrest:
@@ -36,7 +37,9 @@ def run_chapter(run: RigRun) -> Chapter:
         ]  # fmt: skip
     if (back := run.way_back) is not None:
         peak = f"{number(back.peak, 3)} of {run.limit:g} {run.model.unit}"
-        facts.append(("largest command", f"{peak}, at the limit for {100 * back.saturated:.2g} % of the ticks"))
+        facts.append(
+            ("largest command", f"{peak}, at the limit for {two_figures(100 * back.saturated)} % of the ticks")
+        )
     if run.effort is not None:
         facts.append(("command at rest", shown(run.effort, run.limit, run.model.unit)))
     parts = [Part("The run", (Facts(tuple(facts)), *_events(run)))]

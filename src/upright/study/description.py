@@ -25,7 +25,7 @@ from upright.rig.hardware import (
 )
 from upright.study.sensors import Sensor, drive_sign, read_sensors
 from upright.study.text import Section, source_of
-from upright.units import parse
+from upright.units import denominator, parse
 
 
 def read_hardware(study: Section, plant: type[Plant], rig: GreyBox, logs: Collection[str] = ()) -> Hardware:
@@ -127,7 +127,7 @@ def rig_of_numbers(plant: Plant, name: str, values: Mapping[str, float], per: st
     `per` is the unit of the drive's gain, ``N m/V``, which tells that of the command.
     """
     force = force_unit(type(plant))
-    unit = per.rpartition("/")[2].strip("()") if "/" in per and per != force else force
+    unit = denominator(per) if "/" in per and per != force else force
     sign, as_commanded = hardware.as_commanded()
     name = name.rpartition(":")[2]  # the class of a plant in a file of the user's own
     return Rig(plant=plant, name=name, gain=sign * values.get(GAIN, 1.0), unit=unit, hardware=as_commanded)

@@ -409,5 +409,5 @@ def drive_unit(study: Section) -> str:
     gain: Any = study.section("actuator").values.get("gain")
     if isinstance(gain, dict):
         gain = gain.get("guess", gain.get("value"))
-    below = gain.rpartition("/")[2].strip(" ()") if isinstance(gain, str) and "/" in gain else ""
+    below = units.denominator(gain).strip() if isinstance(gain, str) else ""
     return below if below and units.known(below) else ""

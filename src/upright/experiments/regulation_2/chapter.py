@@ -16,6 +16,7 @@ from upright.designing.run import Designed, DesignRequest, design_for
 from upright.experiments.regulation_2.figures import chances_figure, runs_figure, ways_figure
 from upright.experiments.regulation_2.run import DRAWS, SETS, Attempt, Regulation
 from upright.gains.requests import written
+from upright.quantities import two_figures
 from upright.report.page import Chapter, KeyNumber
 from upright.report.prose import chapter_of
 from upright.report.rig import of_rig, rig_table
@@ -38,7 +39,8 @@ def chapter(result: Regulation) -> Chapter:
         __name__, result=result, best=best, ran=ran,
         agreed=[a for a in ran if a.word == a.before.word], excess=_excess(result, best), chance=_probability,
         shown=partial(_shown, result.rig), still=lambda s: s.final[0] <= 2 * result.rig.resolution[0],
-        rest_of=lambda a: effort_at_rest(a.after), word=word, of_limit=of_limit, roots=written, sure=SURE, felt=FELT,
+        rest_of=lambda a: effort_at_rest(a.after), word=word, of_limit=of_limit, two_figures=two_figures,
+        roots=written, sure=SURE, felt=FELT,
         more_draws=DRAWS, sets=SETS, placed={"rig": (rig_table(result.rig),)},
         figures={
             "regulation-chances": lambda: chances_figure(

@@ -22,6 +22,7 @@ from upright.identification.model.grey_box import Parameter
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.residuals import Problem
 from upright.identification.problem.unknowns import shared_unknowns
+from upright.units import denominator
 
 Array = NDArray[np.float64]
 
@@ -286,7 +287,7 @@ def _without(
     """Estimates per assumed gain, in units of the command, seconds, and counts if all encoders have one resolution."""
     if assumed.name != "actuator.gain":
         return {}
-    force, _, command = assumed.unit.partition("/")
+    force, command = assumed.unit.partition("/")[0], denominator(assumed.unit)
     quanta = {q for track in problem.tracks for q in track.run.resolution}
     resolution = quanta.pop() if len(quanta) == 1 else 0.0
     out: dict[str, Estimate] = {}

@@ -16,6 +16,7 @@ from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.problem.unknowns import matters
 from upright.signals.smoothing import dominant_period, savitzky_golay, smoothing_width
+from upright.units import denominator
 
 Array = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def _called(rig: GreyBox, name: str, units: Mapping[str, str]) -> tuple[str, str
     source = name.removeprefix("command.")
     if source != name:
         gain = rig.parameters.get("actuator.gain")
-        unit = gain.unit.rpartition("/")[2] if gain is not None and "/" in gain.unit else ""
+        unit = denominator(gain.unit) if gain is not None else ""
         return f"the command of {source}", f" {unit}" if unit else ""
     if name in units:
         return name, f" {units[name]}"

@@ -22,6 +22,7 @@ from upright.records import Record
 from upright.records.columns import ANGLES, LENGTHS
 from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import acceleration_width, savitzky_golay, smoothed
+from upright.study.draft.accelerating import HEAVY
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.plausible import implausible
@@ -93,11 +94,15 @@ class Balanced:
 
 @dataclass(frozen=True, kw_only=True)
 class PendulumStarts:
-    """Numbers of a plant in SI: `assumed` with the reason, `guesses` to estimate, `uncertain` with how much [%]."""
+    """Numbers of a plant in SI: `assumed` with the reason, `guesses` to estimate, `uncertain` with how much [%].
+
+    `known` are those of which nobody is asked, with the reason.
+    """
 
     assumed: Mapping[str, tuple[float, str]]
     guesses: Mapping[str, float]
     uncertain: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
+    known: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
 
 
 def pendulum_tables(
@@ -109,6 +114,8 @@ def pendulum_tables(
     if balanced:
         recognised = recognised_upright(recognised, balanced)
     starts = starts_upright(balanced, recognised.plant) if balanced else starts_hanging(recognised, plant)
+    if recognised.accelerates:
+        starts = _carried(starts, plant)
     remarks = implausible(plant, {**{n: v for n, (v, _) in starts.assumed.items()}, **starts.guesses}, scaled_by="")
     recognised = replace(recognised, doubts=(*recognised.doubts, *remarks))
     tables = [_rig(record, recognised, plant), _parameters(plant, starts), *_drive(recognised, plant, balanced)]
@@ -205,6 +212,17 @@ def starts_hanging(recognised: Recognised, plant: type[Plant]) -> PendulumStarts
     )
 
 
+def _carried(starts: PendulumStarts, plant: type[Plant]) -> PendulumStarts:
+    """The same on a body that goes where it is commanded to: too heavy to be moved, its friction not asked for."""
+    inertia, value = HEAVY[plant.inputs[0].on]
+    gone = {inertia, "b_1", "b_1c", "k_psi"}
+    return replace(
+        starts, known={inertia: (value, "the drive commands its acceleration: so heavy that nothing on it moves it")},
+        assumed={n: v for n, v in starts.assumed.items() if n not in gone},
+        guesses={n: v for n, v in starts.guesses.items() if n not in gone},
+    )  # fmt: skip
+
+
 INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
 """What the drive moves, where the search begins [kg m^2, kg]."""
 
@@ -221,7 +239,10 @@ def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
     left: list[str] = []
     for name in plant.names():
         what = plant.quantity(name)
-        if name in starts.assumed:
+        if name in starts.known:
+            value, why = starts.known[name]
+            table.key(name, with_unit(value, what.unit), f"{what.meaning}; {why}")
+        elif name in starts.assumed:
             value, why = starts.assumed[name]
             table.key(name, assumed(value, what.unit, 4), f"{what.meaning}; {why}")
         elif name in starts.uncertain:
@@ -243,8 +264,12 @@ def _drive(recognised: Recognised, plant: type[Plant], balanced: Balanced | None
     guess = balanced.gain(recognised.plant) if balanced else _gain(recognised)
     speed = next(f"{k.unit}/s" for k in plant.coordinates if k.name == force.on)
     actuator = TomlTable("[actuator]")
-    gain = {"guess": with_unit(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
-    actuator.key("gain", gain, f"{force.meaning} per command; moves {driven} up")
+    if recognised.accelerates:
+        inertia, value = HEAVY[force.on]
+        actuator.key("gain", with_unit(value, per(force.unit, unit)), f"{inertia} times the acceleration commanded")
+    else:
+        gain = {"guess": with_unit(guess, per(force.unit, unit) if unit else force.unit), "min": 0}
+        actuator.key("gain", gain, f"{force.meaning} per command; moves {driven} up")
     idle = with_unit(0, unit or force.unit)
     actuator.key("offset", {"guess": idle}, "command that the drive adds by itself", off=True)
     actuator.key("slope", {"guess": with_unit(0, per(force.unit, speed))}, "force lost per speed", off=True)

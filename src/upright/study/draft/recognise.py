@@ -16,6 +16,7 @@ from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS, bare_name
 from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
+from upright.study.draft.accelerating import acceleration_command
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
 
@@ -60,6 +61,8 @@ class Recognised:
         Sentences about what was guessed.
     earlier : tuple of (float, float)
         Where it swung before, until a hand brought it back [s].
+    accelerates : bool
+        Whether the drive commands the acceleration of its body, and not a force.
     """
 
     plant: str
@@ -73,6 +76,7 @@ class Recognised:
     settled: bool
     doubts: tuple[str, ...]
     earlier: tuple[tuple[float, float], ...] = ()
+    accelerates: bool = False
 
 
 def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recognised:
@@ -94,6 +98,14 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         plant, doubt = plant_of(positions, drive)
         doubts += [doubt] if doubt else []
     columns, missing = _assign(find(plant), positions)
+    follows = acceleration_command(record, inspection, find(plant), columns)
+    accelerates = follows is not None and (drive is None or drive.name == follows.name)
+    if accelerates and follows is not None:
+        drive, body = follows, columns[pushed_coordinate(plant, columns)].name
+        doubts.append(
+            f"'{drive.name}' is the acceleration of '{body}': taken for the command of a drive that follows it "
+            f"whatever hangs there, as a stepper does."
+        )
     degrees = [c.name for c in columns.values() if c.guess == "deg" and inspection.column(c.name).guess == "rad"]
     doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
@@ -140,6 +152,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         settled=bool(inspection.rests) or (drive is not None and _starts_still(last, record[drive.name])),
         doubts=tuple(doubts),
         earlier=earlier,
+        accelerates=accelerates,
     )
 
 

@@ -16,7 +16,7 @@ from upright.study.text import TomlTable, Value
 from upright.study.windows import digits_within
 
 PLACES = (*ANGLES, *LENGTHS)
-EFFORTS = ("V", "A", "N", "N m")
+EFFORTS = ("V", "A", "N", "N m", "m/s^2", "rad/s^2")
 """Units of commands: a gain per mV would call a thousandth of it by the same number."""
 ROLES = {"fit": "fitted", "predict": "scored, never fitted"}
 
