@@ -41,7 +41,7 @@ def weigh(log: str | Path, *, masses: Mapping[str, float] | None = None, gravity
 
 
 @command("Control", metavars={"gain": "K"}, names={"gain": "--gain -k"}, ranges={"gain": (0.0, None)},
-         wrong=lambda said: said == "0.0", more="upright bench shake -k 2")
+         wrong=lambda said: said == "0.0", more="upright shaker shake -k 2")
 def shake(*, gain: float = 1.0) -> str:
     """Shake a bench."""
     return str(gain)
@@ -55,7 +55,7 @@ def package(tmp_path, monkeypatch):
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: bench-tools\nVersion: 1.0\n", encoding="utf-8")
     (about / "entry_points.txt").write_text(
-        "[upright.commands]\nweigh = bench_tools:weigh\nbench shake = bench_tools:shake\n"
+        "[upright.commands]\nweigh = bench_tools:weigh\nshaker shake = bench_tools:shake\n"
         "identify = bench_tools:weigh\nlost = no_such_module:verb\n",
         encoding="utf-8",
     )
@@ -85,16 +85,16 @@ def test_its_help_is_its_docstring(package):
 def test_it_stands_in_the_listing_under_its_own_words(package):
     lines = [line.split() for line in run("--help").stdout.splitlines()]
     assert ["weigh", "Weigh", "what", "a", "log", "says."] in lines
-    assert ["bench", "shake", "Shake", "a", "bench."] in lines
+    assert ["shaker", "shake", "Shake", "a", "bench."] in lines
     assert ["Other", "packages:"] in lines
-    assert run("bench", "--help").stdout.count("Shake a bench.") == 1
+    assert run("shaker", "--help").stdout.count("Shake a bench.") == 1
 
 
 def test_a_command_of_two_words_declares_what_its_signature_cannot(package):
-    assert (run("bench", "shake", "-k", "2").stdout, run("bench", "shake", "-k", "2").exit_code) == ("2.0\n", 0)
-    assert run("bench", "shake", "--gain", "0").exit_code == 3
-    assert run("bench", "shake", "--gain", "-1").exit_code == 2
-    assert "upright bench shake -k 2" in run("bench", "shake", "--help").stdout
+    assert (run("shaker", "shake", "-k", "2").stdout, run("shaker", "shake", "-k", "2").exit_code) == ("2.0\n", 0)
+    assert run("shaker", "shake", "--gain", "0").exit_code == 3
+    assert run("shaker", "shake", "--gain", "-1").exit_code == 2
+    assert "upright shaker shake -k 2" in run("shaker", "shake", "--help").stdout
 
 
 def test_no_package_takes_the_place_of_a_command(package):
