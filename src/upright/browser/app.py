@@ -37,10 +37,9 @@ SHARED = {
     "drawing.js": ("upright.live", "drawing.js", SCRIPT),
     "kernel.js": ("upright.live", "kernel.js", SCRIPT),
     "twin.js": ("upright.live", "twin.js", SCRIPT),
-    "uPlot.js": ("upright.report.interactive", "uplot/uPlot.iife.min.js", SCRIPT),
-    "uPlot.css": ("upright.report.interactive", "uplot/uPlot.min.css", STYLE),
     "tokens.css": ("upright.report", "templates/tokens.css", STYLE),
     "bench.js": ("upright.browser", "page/bench.js", SCRIPT),
+    "worker.js": ("upright.browser", "page/worker.js", SCRIPT),
     "bench.css": ("upright.browser", "page/bench.css", STYLE),
 }
 """What the page is made of, by its name in an address: package, file, type. The scripts are those of the reports."""

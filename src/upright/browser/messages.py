@@ -63,6 +63,7 @@ TABLE: Mapping[str, Mapping[str, tuple[Callable[[Any], Any], bool]]] = {
     "release": {},
     "start": {"seconds": (_number, False), "start": (_numbers, False), "accept": (_text, False)},
     "stop": {},
+    "end": {},
     "rearm": {},
     "tap": {"coordinate": (_text, True), "speed": (_number, True)},
     "poles": {"poles": (_poles, True), "confirm": (_flag, False)},

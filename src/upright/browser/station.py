@@ -18,7 +18,7 @@ from upright.browser.runs import in_own_process, write_report
 from upright.errors import BadInput, UprightError, nearest
 from upright.live.twin import Loop
 from upright.realtime.desk import Desk
-from upright.realtime.process import DEAF, run_in_process
+from upright.realtime.process import BY_HAND, DEAF, run_in_process
 from upright.realtime.session import RunEnd, RunState
 from upright.rigs.board import SENTENCES
 from upright.running.rig import NEAR
@@ -62,7 +62,7 @@ class Station:
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
         self.last, self.over, self.desk = RunState(phase=""), True, None
         self.loop, self.requested = rig.loop, None
-        self._accepted, self._fifo = "", fifo
+        self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
         self._beat = time.monotonic()
 
@@ -94,7 +94,7 @@ class Station:
         )
         self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
         self.last, self.desk, self.loop = RunState(phase="starting"), Desk(), self.rig.loop
-        self.state, self.over = STARTING, False
+        self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
         self._thread = threading.Thread(target=self._run, args=(request, self.desk), name=f"run of {self.rig.name}")
         self._thread.start()
@@ -106,6 +106,18 @@ class Station:
                 self.desk.stop()
             if self.state != STOPPED:
                 self.state, self.why = STOPPED, why
+
+    def end(self, who: str) -> None:
+        """End a run as its seconds do, so that the next one can begin.
+
+        Raises
+        ------
+        BadInput
+            When they do not operate it, or nothing runs.
+        """
+        self._operated(who)
+        desk, self._ending = self._running(), True
+        desk.stop()
 
     def rearm(self, who: str) -> None:
         """Let it be started again.
@@ -208,7 +220,8 @@ class Station:
             if end is not None:
                 self.last = replace(self.last, late=end.late, tick=end.ticks, faults=end.faults)
             if self.state != STOPPED:
-                self.state, self.why = (STOPPED, why) if why else (ENDED, "")
+                by_operator = self._ending and why == BY_HAND
+                self.state, self.why = (STOPPED, why) if why and not by_operator else (ENDED, "")
 
     def _watch(self, state: RunState) -> str:
         self.last = state
@@ -249,6 +262,8 @@ def obey(station: Station, who: str, message: ClientRequest) -> None:
             station.stop(
                 "Stopped by its operator." if station.lease.holder == who else "Stopped by somebody who watches."
             )
+        case "end":
+            station.end(who)
         case "rearm":
             station.rearm(who)
         case "start":
