@@ -1,0 +1,113 @@
+// The bench: one rig on three screens, and what is there on each of them.
+
+import { Bar, isPhone, message } from "./bar";
+import { Design } from "./design";
+import { byId, make } from "./dom";
+import { Run } from "./run";
+import { Runs } from "./runs";
+import { Session } from "./session";
+
+interface Listed {
+  name: string;
+  title: string;
+}
+
+const SCREENS = ["run", "design", "runs"] as const;
+type Screen = (typeof SCREENS)[number];
+
+const AGAIN = 1000; // ms
+
+async function rigs(): Promise<Listed[]> {
+  for (;;) {
+    const answer = await fetch("/api/rigs").catch(() => undefined);
+    if (answer?.ok) return ((await answer.json()) as { rigs: Listed[] }).rigs;
+    await new Promise((resolve) => setTimeout(resolve, AGAIN));
+  }
+}
+
+/** Whether the rig's drawing and kernel are here: a rig whose law is none of state feedback has none. */
+function known(rig: string): Promise<boolean> {
+  return new Promise((resolve) => {
+    const script = make("script", { src: `/rigs/${encodeURIComponent(rig)}/twin.js` });
+    script.onload = () => resolve(typeof DATA !== "undefined");
+    script.onerror = () => resolve(false);
+    document.head.append(script);
+  });
+}
+
+const place = (): string[] => location.hash.split("/").slice(1).map(decodeURIComponent);
+
+async function bench(): Promise<void> {
+  const all = await rigs(), name = (all.find((rig) => rig.name === place()[0]) ?? all[0])?.name;
+  if (!name) return message("This bench has no rig; start it with a RIG.toml.");
+  // The rig's kernel is compiled at the first request: what stops the rig does not wait for it.
+  let moving = false, design: Design | undefined, built = "";
+  const scene = () => {
+    if (!session.scene) return;
+    bar.scene();
+    const { coordinates, point, kind } = session.scene, now = JSON.stringify([coordinates, point, kind, moving]);
+    if (now === built) run.law();
+    else run.build(moving);
+    built = now;
+    if (moving) {
+      design ??= new Design(session);
+      design.scene();
+    }
+    bar.show();
+  };
+  const session: Session = new Session(name, {
+    scene,
+    state: (before) => {
+      const state = session.state;
+      if (state?.state === "ended" && before && !before.verdict && state.verdict) message(state.verdict);
+      if (before?.state !== state?.state || before?.verdict !== state?.verdict) void runs.show();
+      if (before?.state !== "starting" && state?.state === "starting") session.history.clear();
+      bar.show();
+      design?.gate();
+    },
+    message,
+  });
+  const run = new Run(session), runs = new Runs(session);
+  const bar = new Bar(session, { start: () => run.start(), tap: () => run.tap() });
+  const show = (wanted: string | undefined) => {
+    const screen: Screen = (!isPhone() && SCREENS.find((s) => s === wanted && (moving || s !== "design"))) || "run";
+    for (const s of SCREENS) {
+      byId(s).hidden = s !== screen;
+      byId(`tab-${s}`).setAttribute("aria-selected", `${s === screen}`);
+      byId(`tab-${s}`).tabIndex = s === screen ? 0 : -1;
+    }
+    history.replaceState(null, "", `#/${encodeURIComponent(name)}/${screen}`);
+    if (screen === "runs") void runs.show();
+  };
+  const tabs = () => SCREENS.filter((s) => !byId(`tab-${s}`).hidden);
+  for (const screen of SCREENS) byId(`tab-${screen}`).addEventListener("click", () => show(screen));
+  byId("tab-run").parentElement!.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key], now = tabs().findIndex((s) => !byId(s).hidden);
+    if (!step) return;
+    const next = tabs().at((now + step) % tabs().length)!;
+    show(next);
+    byId(`tab-${next}`).focus();
+  });
+  if (all.length > 1) {
+    byId("rigs").hidden = false;
+    byId("rigs").append(...all.map((rig) => make("a", { href: `#/${encodeURIComponent(rig.name)}/run`, ...(rig.name === name ? { "aria-current": "page" } : {}) }, rig.title)));
+  }
+  addEventListener("hashchange", () => (place()[0] === name ? show(place()[1]) : location.reload()));
+  const wanted = place()[1];
+  show(wanted);
+  void known(name).then((is) => {
+    moving = is;
+    run.note = moving ? "" : "it has no drawing: its law is no feedback of states";
+    byId("tab-design").hidden = !moving;
+    scene();
+    if (wanted === "design" && !byId("run").hidden) show(wanted);
+  });
+  const frame = () => {
+    if (!byId("run").hidden) run.draw();
+    bar.clock();
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+}
+
+void bench();

@@ -1,0 +1,85 @@
+// What the page and the server say to each other over a rig's socket.
+
+export type Phase = "idle" | "starting" | "running" | "stopped" | "ended";
+
+export interface Coordinate {
+  name: string;
+  unit: string;
+  meaning: string;
+  /** Encoder counts in a radian or a metre. */
+  per_unit: number;
+}
+
+export interface Scene {
+  type: "scene";
+  name: string;
+  title: string;
+  kind: "TWIN" | "HARDWARE";
+  coordinates: Coordinate[];
+  command: { unit: string; limit: number; step: number };
+  period: number;
+  travel: number | null;
+  /** Index of the coordinate that is driven. */
+  moved: number;
+  /** Readings about which the law holds the rig, and what the coordinates are where all readings are 0. */
+  point: number[];
+  zero: number[];
+  poles: Complex[];
+  K: number[];
+  basis: { level: string; sentence: string };
+  follows: boolean;
+  you: string;
+}
+
+export interface State {
+  type: "state";
+  state: Phase;
+  why: string;
+  operator: "you" | "another" | "nobody";
+  tick: number;
+  late: number;
+  faults: string[];
+  verdict: string;
+}
+
+export type ServerMessage =
+  | Scene
+  | State
+  | { type: "error"; sentence: string }
+  | { type: "applied"; poles: Complex[]; K: number[]; at_tick: number };
+
+export type ClientRequest =
+  | { do: "operate" | "release" | "stop" | "end" | "rearm" }
+  | { do: "start"; seconds?: number; start?: number[]; accept?: string }
+  | { do: "tap"; coordinate: string; speed: number }
+  | { do: "poles"; poles: Complex[]; confirm?: boolean }
+  | { do: "reference"; value: number };
+
+/** Samples of consecutive ticks. */
+export interface Frame {
+  first: number;
+  late: number;
+  /** Per encoder. */
+  counts: Int32Array[];
+  command: Float64Array;
+}
+
+export function decode(buffer: ArrayBuffer): Frame {
+  const view = new DataView(buffer), first = view.getUint32(0, true), n = view.getUint16(4, true);
+  const channels = view.getUint8(6), late = view.getUint8(7), bytes = 8 + (channels + 1) * (4 + 2 * n);
+  if (buffer.byteLength !== bytes) throw new RangeError(`a frame of ${n} samples has ${bytes} bytes, got ${buffer.byteLength}`);
+  let at = 8;
+  const steps = () => {
+    const values = Int32Array.from({ length: n }, (_, i) => view.getInt16(at + 2 * i, true));
+    at += 2 * n;
+    return values;
+  };
+  const counts = Array.from({ length: channels }, () => {
+    const base = view.getInt32(at, true);
+    at += 4;
+    return steps().map((step) => base + step);
+  });
+  const scale = view.getFloat32(at, true);
+  at += 4;
+  return { first, late, counts, command: Float64Array.from(steps(), (step) => step * scale) };
+}
