@@ -1,0 +1,125 @@
+"""A bench as a process of its own, and people in front of it, each with a browser."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from tests.live.browser import CHROMIUM
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
+DESK = {"viewport": {"width": 1280, "height": 720}}
+PATIENCE = 90_000  # ms; the rig's kernel is compiled at the first request, on a machine that may do much else
+
+
+class Server:
+    """`upright bench` as its user starts it, with its twin of the Furuta pendulum."""
+
+    def __init__(self, folder: Path) -> None:
+        if not files("upright.browser").joinpath("page/index.html").is_file():
+            pytest.skip("the page is not built: npm --prefix bench install && npm --prefix bench run build")
+        self.folder, self.port = folder, 0
+        self.open()
+
+    def open(self) -> None:
+        """Start it, at the port that it had before."""
+        command = [sys.executable, "-m", "upright", "bench", "--no-browser", "--no-fifo", "-o", str(self.folder)]
+        self.process = subprocess.Popen([*command, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if address := re.search(r"http://127\.0\.0\.1:(\d+)/", line):
+                self.url, self.port = address[0], int(address[1])
+                return
+        raise AssertionError("the bench printed no address")
+
+    def kill(self) -> None:
+        """End it as a crash does."""
+        self.process.kill()
+        self.process.wait()
+
+    def close(self) -> None:
+        """End it as Ctrl-C does."""
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(60)
+
+
+class Student:
+    """Somebody before the page: what they read and press."""
+
+    def __init__(self, page: Any) -> None:
+        self.page, self.requests, self.wrong = page, [], []
+        page.set_default_timeout(PATIENCE)
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        page.on("console", lambda message: self.wrong.append(message.text) if message.type == "error" else None)
+
+    def sees(self, state: str) -> None:
+        """Wait until the page says that the rig is in a state."""
+        self.page.wait_for_selector(f"#state[data-state={state}]")
+
+    def reads(self, selector: str, text: str) -> None:
+        """Wait until something visible says a text."""
+        self.page.locator(selector, has_text=re.compile(text)).first.wait_for(state="visible")
+
+    def presses(self, selector: str) -> None:
+        """Press a button, even one that is locked: it says why."""
+        self.page.click(selector, force=True)
+
+    def starts(self) -> None:
+        """Take control by starting."""
+        self.page.click("#start")
+        self.sees("running")
+
+    def foreign(self, server: Server) -> list[str]:
+        """Requests that went elsewhere than to this server."""
+        return [url for url in self.requests if urlsplit(url).netloc not in (urlsplit(server.url).netloc, "")]
+
+    def leaves(self) -> None:
+        """Leave the rig idle and free, as the next one would like to find it."""
+        if self.page.locator("#state[data-state=running], #state[data-state=starting]").count():
+            self.page.keyboard.press("Escape")
+            self.sees("stopped")
+        if self.page.locator("#state[data-state=stopped]").count():
+            self.rearms()
+        if self.page.locator("#control", has_text="Give up").is_visible():
+            self.page.click("#control")
+            self.reads("#operator", "Nobody")
+
+    def rearms(self) -> None:
+        """Arm the rig again, once it has come to rest."""
+        while not self.page.locator("#state[data-state=idle]").count():
+            self.page.click("#rearm")
+            self.page.wait_for_timeout(200)  # the browser's clock; a rig on its way to rest refuses with a sentence
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Debian's Chromium."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("Chromium is missing")
+    with playwright.sync_playwright() as runner:
+        opened = runner.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@contextmanager
+def student(opened: Any, server: Server, *, screen: str = "run", dark: bool = False, **kind: Any) -> Iterator[Student]:
+    """Somebody who opens the page."""
+    context = opened.new_context(color_scheme="dark" if dark else "light", **(kind or DESK))
+    someone = Student(context.new_page())
+    someone.page.goto(f"{server.url}#/furuta/{screen}")
+    someone.page.wait_for_selector("#state:not([data-state=lost])")
+    yield someone
+    context.close()

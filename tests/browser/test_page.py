@@ -1,0 +1,273 @@
+"""Can a student balance the twin in the browser, stop it from anywhere, and lose neither the rig nor the page?"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.browser.students import DESK, PHONE, Server, browser, student
+
+pytestmark = pytest.mark.slow
+
+SCREENS = ("run", "design", "runs")
+LIGHT = 400_000
+"""Bytes of the first load at most (issue 25)."""
+COVERS = """() => { const box = document.getElementById('stop').getBoundingClientRect(), inset = 3;
+  return [[0.5, 0.5], [0, 0], [1, 1], [0, 1], [1, 0]].map(([x, y]) => document.elementFromPoint(
+    box.left + inset + x * (box.width - 2 * inset), box.top + inset + y * (box.height - 2 * inset)))
+    .filter((e) => !e?.closest('#stop')).map((e) => e?.outerHTML.slice(0, 100) ?? 'outside') }"""
+"""What lies over a place of the button STOP."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    opened = Server(tmp_path_factory.mktemp("bench"))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as opened:
+        yield opened
+
+
+def tab_to(page, selector: str) -> None:
+    """Press Tab until something has the focus."""
+    page.evaluate("document.activeElement.blur()")
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        if page.locator(f"{selector}:focus").count():
+            return
+    raise AssertionError(f"{selector} cannot be reached by Tab")
+
+
+def test_a_whole_session_by_keyboard_alone(server, chromium):
+    with student(chromium, server) as one:
+        page = one.page
+        one.reads("#operator", "Nobody operates")
+        tab_to(page, "#start")
+        page.keyboard.press("Enter")
+        one.sees("running")
+        one.reads("#operator", "You operate")
+        page.wait_for_selector("#tab-design:not([hidden])")
+        tab_to(page, "#tab-run")
+        page.keyboard.press("ArrowRight")
+        one.reads("#share", r"\d+ of 200 rigs are stabilised")
+        tab_to(page, ".pole[role=slider]")
+        before = page.locator("#pairs input").first.input_value()
+        for _ in range(5):
+            page.keyboard.press("ArrowLeft")
+        assert float(page.locator("#pairs input").first.input_value()) == pytest.approx(float(before) + 1.0, abs=0.06)
+        spoken = page.locator(".pole[role=slider]").first.get_attribute("aria-valuetext")
+        assert re.fullmatch(r"natural frequency [\d.]+ rad/s, damping ratio [\d.]+", spoken)
+        tab_to(page, "#apply")
+        page.keyboard.press("Enter")
+        one.reads("#message", r"act from tick \d+")
+        page.keyboard.press("Escape")
+        one.sees("stopped")
+        one.reads("#latch", "Stopped by its operator")
+        tab_to(page, "#stop")
+        one.leaves()
+        assert one.wrong == []
+
+
+def test_a_whole_session_by_mouse_until_it_falls(server, chromium):
+    with student(chromium, server) as one:
+        page = one.page
+        one.starts()
+        one.reads("#readings", r"0\.\d deg")
+        page.fill("#next label:has-text('tap') input", "8")
+        for _ in range(20):
+            if page.locator("#state[data-state=stopped]").count():
+                break
+            one.presses("#tap")
+        one.sees("stopped")
+        assert "operator" not in page.inner_text("#latch-why")  # the supervisor stopped it, and says why
+        assert len(page.inner_text("#latch-why")) > 20
+        one.presses("#start")  # it is latched
+        one.reads("#message", "rearm it first")
+        one.rearms()
+        page.fill("#next label:has-text('tap') input", "0.8")
+        one.starts()
+        page.click("#tab-design")
+        one.reads("#share", "rigs are stabilised")
+        box = page.locator(".pole[role=slider]").first.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        poles = page.inner_text("#pairs tr:first-child td:last-child")
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x - 12, y - 12, steps=4)
+        page.mouse.up()
+        assert page.inner_text("#pairs tr:first-child td:last-child") != poles
+        page.click("#apply")
+        one.reads("#message", r"act from tick \d+")
+        page.click("#tab-run")
+        page.click("#stop")
+        one.sees("stopped")
+        one.leaves()
+        assert one.wrong == []
+
+
+def test_poles_too_fast_for_the_rigs_cannot_be_applied_and_the_page_says_why(server, chromium):
+    with student(chromium, server) as one:
+        page = one.page
+        one.starts()
+        page.click("#tab-design")
+        page.locator("#pairs input").nth(0).fill("0.5")
+        page.keyboard.press("Enter")
+        page.locator("#pairs input").nth(1).fill("0.05")
+        page.keyboard.press("Enter")
+        one.reads("#gate", "Apply is locked: fewer than 95 % of the rigs")
+        one.presses("#apply")
+        one.reads("#message", "Apply is locked")
+        one.leaves()
+
+
+def test_anybody_stops_and_only_the_operator_arms_again(server, chromium):
+    with student(chromium, server) as one, student(chromium, server) as another:
+        one.starts()
+        another.sees("running")
+        another.reads("#operator", "you can stop it, you cannot steer it")
+        another.presses("#tap")
+        another.reads("#message", "you cannot steer it")
+        another.page.keyboard.press("Escape")
+        for each in (one, another):
+            each.sees("stopped")
+            each.reads("#latch", "Stopped by somebody who watches")
+        another.presses("#rearm")
+        another.page.wait_for_selector("#state[data-state=stopped]")
+        one.leaves()
+        another.sees("idle")
+
+
+def test_loaded_again_in_the_middle_the_operator_still_operates(server, chromium):
+    with student(chromium, server) as one:
+        one.starts()
+        one.page.reload()
+        one.sees("running")
+        one.reads("#operator", "You operate")
+        one.reads("#readings", "deg")
+        one.leaves()
+
+
+def test_a_phone_watches_and_stops(server, chromium):
+    with student(chromium, server) as one, student(chromium, server, screen="design", **PHONE) as phone:
+        one.starts()
+        phone.sees("running")
+        phone.reads("#operator", "You can stop the rig")
+        phone.reads("#readings", "deg")
+        for hidden in ("#start", "#tap", "#tab-design", "#control", "#design"):
+            assert not phone.page.locator(hidden).is_visible()
+        assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
+        box = phone.page.locator("#stop").bounding_box()
+        assert (box["width"], box["height"]) == (390, pytest.approx(72))
+        assert box["y"] + box["height"] == pytest.approx(844)
+        phone.page.tap("#stop")
+        one.sees("stopped")
+        one.leaves()
+        assert phone.wrong == []
+
+
+def test_stop_ends_a_run_with_log_and_report_and_escape_stops_from_within_the_report(server, chromium):
+    with student(chromium, server) as one:
+        page = one.page
+        one.starts()
+        one.reads("#readings", "deg")
+        page.click("#end")
+        one.sees("ended")
+        page.click("#tab-runs")
+        page.wait_for_selector("#runs-rows tr")
+        with page.expect_download() as download:
+            page.locator("#runs-rows tr").first.locator("a").click()
+        assert Path(download.value.path()).read_bytes()[:5] == b"\x89MCAP"
+        page.locator("#runs-rows tr").first.locator("button").click()
+        page.frame_locator("#report").locator("h1").wait_for()
+        assert page.evaluate(COVERS) == []
+        page.click("#start")
+        one.sees("running")
+        page.frame_locator("#report").locator("h1").click()
+        page.keyboard.press("Escape")
+        one.sees("stopped")
+        one.leaves()
+
+
+def test_a_server_that_is_gone_is_said_and_its_successor_is_found(server, chromium):
+    with student(chromium, server) as one:
+        one.starts()
+        server.kill()
+        one.sees("lost")
+        one.reads("#latch", "use the rig's own switch")
+        one.page.keyboard.press("Escape")
+        one.reads("#message", "STOP could not be sent")
+        server.open()
+        one.sees("stopped")  # by the stop that was still to be sent
+        one.leaves()
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_axe_finds_nothing_nothing_is_clipped_and_stop_lies_open(server, chromium, dark, tmp_path):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    violations = []
+    for kind in (DESK, {"viewport": {"width": 768, "height": 900}}, {"viewport": {"width": 390, "height": 844}}, PHONE):
+        with student(chromium, server, dark=dark, **kind) as one:
+            width = kind["viewport"]["width"]
+            one.page.wait_for_selector("#drawing polyline", state="attached")
+            for screen in SCREENS:
+                if kind is not PHONE:
+                    one.page.click(f"#tab-{screen}")
+                if screen == "design" and kind is not PHONE:
+                    one.reads("#share", "rigs are stabilised")
+                present = axe.Axe().run(one.page).response["violations"]
+                violations += [(width, screen, v["id"], [n["html"][:100] for n in v["nodes"]]) for v in present]
+                assert one.page.evaluate("document.documentElement.scrollWidth") <= width
+                assert one.page.evaluate(COVERS) == []
+            assert one.wrong == []
+            assert one.foreign(server) == []
+    assert violations == []
+
+
+def test_the_first_load_is_below_400_kB_and_asks_nobody_else(server, chromium):
+    loaded = []
+    with student(chromium, server) as one:
+        one.page.on("response", lambda response: loaded.append((response.url, len(response.body()))))
+        one.page.reload()
+        one.page.wait_for_selector("#tab-design:not([hidden])")
+        one.page.click("#tab-design")
+        one.reads("#share", "rigs are stabilised")
+        assert one.foreign(server) == []
+    assert 10_000 < sum(size for _, size in loaded) < LIGHT, loaded
+
+
+def test_on_hardware_poles_are_applied_only_after_a_second_press(server, chromium):
+    """The server's twin, told to the page as hardware on its way through the socket."""
+    sent = []
+    context = chromium.new_context(**DESK)
+    page = context.new_page()
+
+    def between(route):
+        real = route.connect_to_server()
+        real.on_message(lambda m: route.send(m.replace('"TWIN"', '"HARDWARE"') if isinstance(m, str) else m))
+        route.on_message(lambda m: (sent.append(m), real.send(m)))
+
+    page.route_web_socket(re.compile("/live/"), between)
+    page.goto(f"{server.url}#/furuta/run")
+    page.wait_for_selector(".badge.hardware")
+    assert not page.locator("#tap").is_visible()
+    page.click("#start")
+    page.wait_for_selector("#state[data-state=running]")
+    page.click("#tab-design")
+    page.wait_for_selector("#apply[aria-disabled=false]")
+    page.click("#apply")
+    page.locator("#gate", has_text="This moves a real rig").wait_for()
+    assert not any("poles" in message for message in sent)
+    page.click("#cancel")
+    page.click("#apply")
+    page.click("#apply")
+    page.locator("#message", has_text="act from tick").wait_for()
+    assert [m for m in sent if "poles" in m][0].endswith('"confirm":true}')
+    page.click("#stop")
+    page.wait_for_selector("#state[data-state=stopped]")
+    context.close()
