@@ -176,6 +176,29 @@ def test_a_signal_is_pinned_where_it_stays_for_three_samples(x, low, high):
     assert (seen.low_share, seen.high_share) == (pytest.approx(low), pytest.approx(high))
 
 
+@pytest.mark.parametrize("amplitude", [190.6, 191.0, 191.49])
+@pytest.mark.parametrize("slow", [400, 1111])
+def test_the_top_of_a_sine_that_is_put_out_in_steps_is_no_limit(amplitude, slow):
+    """On its last step a parabola stays at most 1/(sqrt(2) - 1) times as long as on the one before."""
+    sine = amplitude * np.sin(2 * np.pi * (np.arange(20 * slow) + 0.3) / slow)
+    seen = column("u", np.round(sine) * 0.0235)
+    assert (seen.low_share, seen.high_share) == (0, 0)
+    cut = column("u", np.round(np.clip(sine, -170, 170)) * 0.0235)
+    share = np.mean(sine > 169.5)
+    assert (cut.low_share, cut.high_share) == (pytest.approx(share, rel=0.02), pytest.approx(share, rel=0.02))
+
+
+@pytest.mark.parametrize(("name", "unit"), [("loop_us", "us"), ("exec_time_ms", "ms"), ("dt", "s")])
+def test_a_column_named_after_a_unit_of_time_is_no_counter(name, unit):
+    assert column(name, 350 + 30 * np.round(WAVE * 10)).guess == unit
+
+
+def test_the_volts_of_a_supply_drive_nothing():
+    for name in ("battery_voltage", "vbat", "supply [V]", "v_bus"):
+        assert not column(name, 12 + 0.1 * WAVE).drive
+    assert column("motor_voltage", 12 * WAVE).drive
+
+
 def resting(*still: tuple[int, int], size: int = 1000, creep: float = 0.0) -> np.ndarray:
     """Signal over [-1, 1] that stays, or creeps by `creep` of its range in 25 samples, from sample a to before b."""
     x = np.where(np.arange(size) % 2, 1.0, -1.0)

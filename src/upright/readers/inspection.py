@@ -27,6 +27,8 @@ _RATE = re.compile(r"velocity|speed|rate|_dot|omega|qd", re.IGNORECASE)
 _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
 _LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement|cart|carriage)\d*$", re.IGNORECASE)
 _PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|cm|mm)", re.IGNORECASE)
+_LASTS = re.compile(r".+_(?P<unit>us|ms|ns)|(?P<bare>dt|latency|jitter)", re.IGNORECASE)
+_SUPPLY = re.compile(r"batt|supply|v_?(cc|dd|bus|bat|in)\b", re.IGNORECASE)
 _VOLTS = re.compile(r"volt|plant_input|control_output|feedforward|^(u|v)$", re.IGNORECASE)
 _EFFORT = re.compile(
     r"(?i:u|v|i|f|t|tau|motor|force|moment)_?(?i:\d|m|motor)?(?:\s*[\[(]\s*([^\[\]()]+?)\s*[\])]|_(m?[VA]|Nm?))\s*"
@@ -191,6 +193,8 @@ def _column(record: Record, name: str) -> Column:
 def _guess_unit(name: str, values: Array, step: Resolution) -> str:
     """Unit from name and step; empty when neither tells."""
     whole = bool((values == np.round(values)).all()) and np.ptp(values) > 0
+    if lasts := _LASTS.fullmatch(name):
+        return (lasts["unit"] or "s").lower()
     if _RATE.search(name):
         return "" if whole else "rad/s" if _ANGLE.search(name) or "joint" in name else ""
     if (unit := _place_unit(name)) and not step.counts_per_rev:
@@ -225,6 +229,8 @@ def effort_unit(name: str) -> str:
 
 def _is_drive(name: str, values: Array, unit: str) -> bool:
     """Whether a column drives rather than is measured: by name, or because it moves in a few steps only."""
+    if _SUPPLY.search(name):
+        return False
     if _DRIVE.search(name) or effort_unit(name):
         return True
     if unit not in ("", "1") and any(units.same_dimension(unit, load) for load in LOADS):
@@ -236,13 +242,20 @@ def _is_drive(name: str, values: Array, unit: str) -> bool:
     return unit not in ("rad", "m", "counts") and 2 <= levels <= 5 and 0 < changes <= 0.1 * values.size
 
 
+ROUND_TOP = 3.0
+"""Times as long that a smooth signal stays on its last step as on the one before, at most: 1/(sqrt(2) - 1) on top of a
+parabola, and somewhat more where few samples tell."""
+
+
 def _pinned(x: Array, level: float, step: float) -> float:
-    """Share of samples at an extreme that a signal with many levels stays at for 3 samples or more."""
+    """Share of samples at an extreme that a signal with many levels is cut off at, for 3 samples or more."""
     if np.unique(x[:: max(x.size // 5000, 1)]).size < 12:
         return 0.0
     at = np.abs(x - level) <= 0.25 * step
     longest = max(last - first for first, last in stretches(at))
-    return float(at.mean()) if longest >= 2 else 0.0
+    before = level + math.copysign(step, float(np.median(x)) - level)
+    smooth = step > 0 and np.count_nonzero(at) < ROUND_TOP * np.count_nonzero(np.abs(x - before) <= 0.25 * step)
+    return float(at.mean()) if longest >= 2 and not smooth else 0.0
 
 
 def _switches(t: Array, x: Array) -> tuple[tuple[float, float], ...]:
