@@ -19,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
 from upright.browser.hub import Hub
-from upright.browser.messages import read
+from upright.browser.messages import ClientRequest, read
 from upright.browser.outbox import Outbox
 from upright.browser.runs import in_own_process, listed
 from upright.browser.station import Station, obey
@@ -29,7 +29,7 @@ from upright.errors import BadInput, UprightError
 RATE = 40.0
 """Frames a second."""
 PATIENCE = 10
-"""Messages in a row that are not understood before a connection is closed."""
+"""Messages in a row that are not understood, or ten times as many that come too fast, before a connection is closed."""
 SWIFTEST = 50.0
 """Messages of a client in a second."""
 SCRIPT, STYLE = "text/javascript; charset=utf-8", "text/css; charset=utf-8"
@@ -131,7 +131,8 @@ def application(stations: Sequence[Station]) -> Starlette:
 
 async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None:
     """Do what a client asks for, until it is gone or asks for nonsense only."""
-    wrong, allowed, last = 0, SWIFTEST, time.monotonic()
+    wrong, allowed, last, flooded = 0.0, SWIFTEST, time.monotonic(), False
+    placing: asyncio.Task[None] | None = None
     with suppress(WebSocketDisconnect):
         while wrong < PATIENCE:
             received = await socket.receive()
@@ -142,18 +143,31 @@ async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None
             try:
                 message = read(received.get("text") or "")
                 if allowed < 1.0 and message.do != "stop":
-                    raise BadInput(f"at most {SWIFTEST:g} messages a second.")
-                allowed -= 1.0
-                if message.do == "poles":  # takes a while
-                    await asyncio.to_thread(obey, hub.station, who, message)
-                else:
+                    wrong += 0.1
+                    if not flooded:
+                        outbox.note(_error(BadInput(f"at most {SWIFTEST:g} messages a second.")))
+                    flooded = True
+                    continue
+                allowed, flooded = allowed - 1.0, False
+                if message.do != "poles":
                     obey(hub.station, who, message)
-                wrong = 0
-            except BadInput as error:
-                wrong += 1
-                if not outbox.note(json.dumps({"type": "error", "sentence": _sentence(str(error))})):
+                elif placing is None or placing.done():  # takes a while, in which a stop must not wait
+                    placing = asyncio.create_task(_place(hub, who, message, outbox))
+                else:
+                    raise BadInput("the last poles are being placed.")
+                wrong = 0.0
+            except UprightError as error:
+                wrong += 1.0
+                if not outbox.note(_error(error)):
                     return
         await socket.close(4400, "ten messages in a row were not understood")
+
+
+async def _place(hub: Hub, who: str, message: ClientRequest, outbox: Outbox) -> None:
+    try:
+        await asyncio.to_thread(obey, hub.station, who, message)
+    except UprightError as error:
+        outbox.note(_error(error))
 
 
 async def _speak(socket: WebSocket, outbox: Outbox) -> None:
@@ -174,8 +188,9 @@ async def _first(*doing: Any) -> None:
         await asyncio.gather(*tasks, return_exceptions=True)
 
 
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
+def _error(error: UprightError) -> str:
+    text = str(error)
+    return json.dumps({"type": "error", "sentence": text[:1].upper() + text[1:]})
 
 
 def _content(package: str, name: str) -> bytes | None:

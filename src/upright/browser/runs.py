@@ -32,6 +32,11 @@ def write_report(run: PreparedRun, end: RunEnd, started: float) -> str:
     return chapter.verdict
 
 
+def report_apart(run: PreparedRun, end: RunEnd, started: float) -> str:
+    """The same in a process of its own."""
+    return in_own_process(write_report, run, end, started)
+
+
 def listed(folder: Path, name: str) -> list[dict[str, Any]]:
     """Runs of a rig whose report is written, the newest first."""
     out: list[dict[str, Any]] = []

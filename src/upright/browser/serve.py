@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import secrets
 import socket
 import threading
@@ -33,12 +34,12 @@ class Bench:
     """
 
     def __init__(
-        self, rigs: Sequence[BenchRig], folder: Path, *, port: int = 0, lan: bool = False, fifo: bool = True
+        self, rigs: Sequence[BenchRig], folder: Path, *, port: int = 0, lan: bool = False, **of_runs: Any
     ) -> None:
         import uvicorn
 
         self.folder, self.rigs = folder, tuple(rig.name for rig in rigs)
-        self.stations = [Station(rig, folder / rig.name, fifo=fifo) for rig in rigs]
+        self.stations = [Station(rig, folder / rig.name, **of_runs) for rig in rigs]
         self._socket = _bound(port, lan)
         port = self._socket.getsockname()[1]
         token = secrets.token_urlsafe(24) if lan else ""
@@ -60,9 +61,11 @@ class Bench:
         pause = threading.Event()
         while not self._server.started and self._thread.is_alive():
             pause.wait(0.01)
+        atexit.register(self.close)  # before multiprocessing waits for the loops
 
     def close(self) -> None:
         """Stop every rig, then the server."""
+        atexit.unregister(self.close)
         for station in self.stations:
             station.stop("The bench was closed.")
         for station in self.stations:
@@ -88,9 +91,14 @@ class Bench:
 
 
 def open_bench(
-    rigs: Sequence[Path], laws: Sequence[Path], folder: Path, *, port: int, lan: bool = False, fifo: bool = True
+    rigs: Sequence[Path], laws: Sequence[Path], folder: Path, *, port: int = 0, lan: bool = False, **of_runs: Any
 ) -> Bench:
     """A bench of the rigs of some RIG.toml, each with its law; of a twin where there are none.
+
+    Parameters
+    ----------
+    **of_runs
+        Options of each `Station`.
 
     Raises
     ------
@@ -109,7 +117,7 @@ def open_bench(
     names = [rig.name for rig in known]
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise BadInput(f"two rigs are called '{twice[0]}'; give each a name in its RIG.toml.")
-    return Bench(known, folder, port=port, lan=lan, fifo=fifo)
+    return Bench(known, folder, port=port, lan=lan, **of_runs)
 
 
 def _bound(port: int, lan: bool) -> socket.socket:

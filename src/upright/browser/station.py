@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from upright.basis import NOT_TRUSTED
 from upright.browser.lease import Lease
 from upright.browser.messages import ClientRequest
 from upright.browser.rig import HARDWARE, TWIN, BenchRig
-from upright.browser.runs import in_own_process, write_report
+from upright.browser.runs import report_apart
 from upright.errors import BadInput, UprightError, nearest
 from upright.live.twin import Loop
 from upright.realtime.desk import Desk
@@ -22,7 +22,7 @@ from upright.realtime.process import BY_HAND, DEAF, run_in_process
 from upright.realtime.session import RunEnd, RunState
 from upright.rigs.board import SENTENCES
 from upright.running.rig import NEAR
-from upright.running.run import RunRequest, prepared
+from upright.running.run import PreparedRun, RunRequest, prepared
 
 IDLE, STARTING, RUNNING, STOPPED, ENDED = "idle", "starting", "running", "stopped", "ended"
 LONGEST, USUAL = 3600.0, 600.0
@@ -35,6 +35,13 @@ FASTEST = 20.0
 
 class Station:
     """A rig, its runs and its operator.
+
+    Parameters
+    ----------
+    carry, report : callable
+        Run an order as `run_in_process` does; write what it came to, and give the verdict.
+    clock : callable
+        Time that never goes back [s].
 
     Attributes
     ----------
@@ -57,18 +64,21 @@ class Station:
     requested: Loop | None
     _thread: threading.Thread | None
 
-    def __init__(self, rig: BenchRig, folder: Path, *, fifo: bool = True) -> None:
-        self.rig, self.folder, self.lease = rig, folder, Lease()
+    def __init__(
+        self, rig: BenchRig, folder: Path, *, fifo: bool = True, carry: Callable[..., RunEnd] = run_in_process,
+        report: Callable[[PreparedRun, RunEnd, float], str] = report_apart, clock: Callable[[], float] = time.monotonic,
+    ) -> None:  # fmt: skip
+        self.rig, self.folder, self.lease = rig, folder, Lease(clock)
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
         self.last, self.over, self.desk = RunState(phase=""), True, None
         self.loop, self.requested = rig.loop, None
         self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
-        self._beat = time.monotonic()
+        self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
 
     def beat(self) -> None:
         """Say that somebody can stop it; a run whose server does not answer any more ends by itself."""
-        self._beat = time.monotonic()
+        self._beat = self._clock()
         if self.lease.lapsed() and self.state in (STARTING, RUNNING):
             self.stop("The operator is gone.")
 
@@ -96,7 +106,7 @@ class Station:
         self.last, self.desk, self.loop = RunState(phase="starting"), Desk(), self.rig.loop
         self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
-        self._thread = threading.Thread(target=self._run, args=(request, self.desk), name=f"run of {self.rig.name}")
+        self._thread = threading.Thread(target=self._run, args=(request, self.desk), name=self.rig.name, daemon=True)
         self._thread.start()
 
     def stop(self, why: str) -> None:
@@ -201,7 +211,7 @@ class Station:
         try:
             run = prepared(request, self.folder)
             order = replace(run.order, wall=True, fifo=self._fifo)
-            end = run_in_process(order, watch=self._watch, desk=desk)
+            end = self._carry(order, watch=self._watch, desk=desk)
         except UprightError as error:
             self._ended(str(error))
             return
@@ -210,7 +220,7 @@ class Station:
             raise
         self._ended(end.stopped, end)
         try:
-            self.verdict = in_own_process(write_report, run, end, started)
+            self.verdict = self._report(run, end, started)
         except UprightError as error:
             self.verdict = f"There is no report: {error}"
 
@@ -228,7 +238,7 @@ class Station:
         with self._lock:
             if self.state == STARTING and state.phase == "running":
                 self.state = RUNNING
-        gone = time.monotonic() - self._beat
+        gone = self._clock() - self._beat
         return f"The bench's server has not answered for {DEAF:g} s." if gone > DEAF else ""
 
     def described(self, who: str) -> dict[str, Any]:

@@ -20,6 +20,9 @@ def _until_closed(bench: Bench) -> Iterator[str]:
     yield f"{', '.join(bench.rigs)}: {bench.url}"
     yield "Open this address in a browser; take control, then start. Logs and reports are kept in " + str(bench.folder)
     yield "Ctrl-C stops every rig and closes the bench. Keep a stop in hardware within reach: this is software."
+    from signal import SIGTERM, default_int_handler, signal
+
+    signal(SIGTERM, default_int_handler)
     try:
         bench.wait()
     except KeyboardInterrupt:

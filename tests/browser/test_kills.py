@@ -1,0 +1,154 @@
+"""Is the drive off, and the loop's process gone, whenever the server, an operator or the loop dies? Real processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from websockets.sync.client import connect
+
+from tests.realtime.rigs import BLANK, put_out
+from tests.realtime.test_process import ours, until
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")]
+ROOT = Path(__file__).parents[2]
+SERVER = """
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tests.realtime.rigs import witnessed
+from upright.browser.serve import open_bench
+from upright.realtime.process import run_in_process
+
+def carry(order, **more):
+    return run_in_process(replace(order, make=partial(witnessed, out), check=False), **more)
+
+if __name__ == "__main__":
+    out = Path(sys.argv[1]) / "out"
+    bench = open_bench([], [], out.parent, carry=carry, report=lambda *_: "", fifo=False)
+    print(bench.url, flush=True)
+    bench.wait()
+"""
+
+
+@pytest.fixture
+def server(tmp_path):
+    """A server whose rig writes what it puts out where it outlives everybody."""
+    (tmp_path / "out").write_bytes(BLANK)
+    (tmp_path / "server.py").write_text(SERVER, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, str(tmp_path / "server.py"), str(tmp_path)], env=ours(), cwd=ROOT, stdout=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    process.url = process.stdout.readline().strip()
+    yield process, tmp_path / "out"
+    os.kill(process.pid, signal.SIGCONT)
+    process.kill()
+    process.communicate()  # ends with the last process that holds its output, which is the loop's
+
+
+def started(process):
+    """An operator who has asked for a run."""
+    socket = connect(process.url.replace("http", "ws", 1) + "live/furuta")
+    socket.send(json.dumps({"do": "operate"}))
+    socket.send(json.dumps({"do": "start", "seconds": 600}))
+    return socket
+
+
+def state_of(socket, *wanted):
+    """The next state that is one of these."""
+    while True:
+        content = socket.recv(timeout=60)
+        if isinstance(content, str) and (note := json.loads(content))["type"] == "state" and note["state"] in wanted:
+            return note
+
+
+@pytest.mark.parametrize("after", [0.0, 0.3, 0.6, 0.9, 1.2, 1.5, 2.0, 3.0])
+def test_a_server_that_is_killed_at_any_instant_of_the_start_leaves_the_drive_off(server, after):
+    process, out = server
+    with started(process) as socket:
+        state_of(socket, "starting")
+        threading.Event().wait(after)
+        process.kill()
+        process.communicate()  # the loop's process has ended too
+    assert put_out(out)[:2] == (0.0, 0)
+
+
+@pytest.mark.parametrize("name", ["SIGKILL", "SIGTERM", "SIGHUP"])
+def test_a_drive_that_is_on_goes_off_with_the_server(server, name):
+    process, out = server
+    with started(process) as socket:
+        state_of(socket, "running")
+        assert until(lambda: put_out(out)[1] == 1)
+        process.send_signal(getattr(signal, name))
+        process.communicate()
+    assert put_out(out)[:2] == (0.0, 0)
+
+
+def test_a_server_that_stands_still_cannot_stop_anything_so_the_loop_ends_itself(server):
+    process, out = server
+    with started(process) as socket:
+        state_of(socket, "running")
+        assert until(lambda: put_out(out)[1] == 1)
+        process.send_signal(signal.SIGSTOP)
+        assert until(lambda: put_out(out)[:2] == (0.0, 0), 10.0)
+        process.send_signal(signal.SIGCONT)
+        assert "not looked" in state_of(socket, "stopped")["why"]
+
+
+def test_a_stop_of_somebody_who_watches_turns_the_drive_off(server):
+    process, out = server
+    with started(process) as socket, connect(process.url.replace("http", "ws", 1) + "live/furuta") as watcher:
+        state_of(socket, "running")
+        assert until(lambda: put_out(out)[1] == 1)
+        watcher.send(json.dumps({"do": "stop"}))
+        assert until(lambda: put_out(out)[:2] == (0.0, 0), 5.0)
+        assert "watches" in state_of(socket, "stopped")["why"]
+
+
+def test_an_operator_whose_page_is_killed_is_missed_after_ten_seconds(server):
+    process, out = server
+    page = subprocess.Popen(
+        [sys.executable, "-c", PAGE, process.url.replace("http", "ws", 1) + "live/furuta"], stdout=subprocess.PIPE
+    )
+    assert page.stdout.readline() == b"running\n"
+    with connect(process.url.replace("http", "ws", 1) + "live/furuta") as watcher:
+        page.kill()
+        page.communicate()
+        assert put_out(out)[1] == 1
+        assert "gone" in state_of(watcher, "stopped")["why"]
+        assert until(lambda: put_out(out)[:2] == (0.0, 0), 5.0)
+
+
+PAGE = """
+import json, sys
+from websockets.sync.client import connect
+socket = connect(sys.argv[1])
+socket.send(json.dumps({"do": "operate"}))
+socket.send(json.dumps({"do": "start", "seconds": 600}))
+running = False
+while True:
+    note = socket.recv()
+    if not running and isinstance(note, str) and json.loads(note).get("state") == "running":
+        running = True
+        print("running", flush=True)
+"""
+
+
+def test_a_loop_that_is_killed_is_a_stop_with_a_sentence(server):
+    process, _ = server
+    with started(process) as socket:
+        state_of(socket, "running")
+        children = Path(f"/proc/{process.pid}/task").glob("*/children")
+        loops = [int(pid) for each in children for pid in each.read_text().split()]
+        for pid in loops:
+            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                os.kill(pid, signal.SIGKILL)
+        assert "was killed" in state_of(socket, "stopped")["why"]

@@ -1,0 +1,234 @@
+"""Is a stop final until the operator arms again, whoever stops and whatever was going on?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.browser.runs import felt, hardware, settled, station, twin
+from upright.basis import NOT_TRUSTED, Basis
+from upright.browser.lease import PATIENCE
+from upright.browser.messages import ClientRequest
+from upright.browser.station import obey
+from upright.errors import BadInput
+from upright.realtime.process import DEAF
+from upright.realtime.session import RunState
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    return twin(tmp_path_factory.mktemp("bench"))
+
+
+@pytest.fixture
+def at_work(rig, tmp_path):
+    with station(rig, tmp_path) as made:
+        yield made
+
+
+def ask(made, who, do, **fields):
+    obey(made, who, ClientRequest(do=do, fields=fields))
+
+
+def test_a_run_goes_from_idle_to_its_end_and_has_a_verdict(at_work):
+    made, carry, _ = at_work
+    ask(made, "operator", "start", seconds=5.0)
+    assert made.state == "starting"
+    carry.go(RunState(phase="testing: a small pulse"))
+    assert made.state == "starting"
+    assert carry.go() == ""
+    assert made.state == "running"
+    assert (carry.orders[0].seconds, carry.orders[0].wall) == (5.0, True)
+    carry.end()
+    assert settled(made, lambda m: m.verdict)
+    assert (made.state, made.why, made.verdict, made.last.late) == ("ended", "", "the verdict", 7)
+    ask(made, "operator", "start")
+    assert made.state == "starting"
+
+
+@pytest.mark.parametrize("when", ["idle", "starting", "running"])
+@pytest.mark.parametrize(("who", "why"), [("operator", "its operator"), ("a watcher", "somebody who watches")])
+def test_anybody_stops_it_at_any_time_and_only_the_operator_arms_it_again(at_work, when, who, why):
+    made, carry, _ = at_work
+    if when != "idle":
+        ask(made, "operator", "start")
+    if when == "running":
+        carry.go()
+    assert made.state == when
+    ask(made, who, "stop")
+    assert (made.state, why in made.why) == ("stopped", True)
+    assert when == "idle" or made.desk.stopping
+    with pytest.raises(BadInput, match="Arm it again"):
+        ask(made, "operator", "start")
+    with pytest.raises(BadInput, match="somebody else operates"):
+        ask(made, "a watcher", "rearm")
+    if when != "idle":
+        carry.go()  # a loop that has not looked yet changes nothing
+        assert made.state == "stopped"
+        with pytest.raises(BadInput, match="on its way to rest"):
+            ask(made, "operator", "rearm")
+        carry.end("Stopped by hand.")
+        assert settled(made, lambda m: m.over)
+    assert why in made.why  # who, and not the loop's own sentence
+    ask(made, "operator", "rearm")
+    assert (made.state, made.why) == ("idle", "")
+    ask(made, "operator", "start")
+    assert not made.desk.stopping
+
+
+def test_what_the_supervisor_stops_stays_stopped(at_work):
+    made, carry, _ = at_work
+    ask(made, "operator", "start")
+    carry.go()
+    carry.end("theta is 31 degrees from where it is to be stabilised: it fell.")
+    assert settled(made, lambda m: m.over)
+    assert (made.state, "it fell" in made.why) == ("stopped", True)
+    with pytest.raises(BadInput, match="it fell"):
+        ask(made, "operator", "start")
+
+
+@pytest.mark.parametrize(
+    ("do", "fields"),
+    [("start", {}), ("rearm", {}), ("tap", {"coordinate": "theta", "speed": 1.0}), ("reference", {"value": 0.1}),
+     ("poles", {"poles": [-5.0, -6.0, -7.0, -8.0]})],
+)  # fmt: skip
+def test_who_watches_changes_nothing(at_work, do, fields):
+    made, carry, _ = at_work
+    ask(made, "operator", "start")
+    carry.go()
+    with pytest.raises(BadInput, match="somebody else operates it"):
+        ask(made, "a watcher", do, **fields)
+    assert (made.state, made.desk.stopping) == ("running", False)
+    assert felt(made.desk, made.rig.law) == ([], [], None)
+
+
+def test_one_operates_until_they_give_it_away(at_work):
+    made, _, _ = at_work
+    with pytest.raises(BadInput, match="somebody else"):
+        ask(made, "second", "operate")
+    ask(made, "operator", "release")
+    with pytest.raises(BadInput, match="take it first"):
+        ask(made, "operator", "start")
+    ask(made, "second", "operate")
+    ask(made, "second", "start")
+    assert made.state == "starting"
+    assert [made.described(who)["operator"] for who in ("operator", "second")] == ["another", "you"]
+
+
+def test_a_rig_whose_operator_stays_away_is_stopped(at_work):
+    made, carry, clock = at_work
+    ask(made, "operator", "start")
+    carry.go()
+    made.lease.gone("operator")
+    clock.now += PATIENCE
+    made.beat()
+    assert made.state == "running"
+    clock.now += 0.1
+    made.beat()
+    assert (made.state, made.desk.stopping, made.lease.holder) == ("stopped", True, "")
+    assert "gone" in made.why
+
+
+def test_a_reload_within_ten_seconds_stops_nothing(at_work):
+    made, carry, clock = at_work
+    ask(made, "operator", "start")
+    carry.go()
+    made.lease.gone("operator")
+    clock.now += PATIENCE - 0.1
+    made.lease.back("operator")
+    clock.now += 100.0
+    made.beat()
+    assert (made.state, made.lease.holder) == ("running", "operator")
+
+
+def test_a_server_that_does_not_answer_ends_the_run(at_work):
+    """Whose thread still looks at the loop although nobody can stop it through the server."""
+    made, carry, clock = at_work
+    ask(made, "operator", "start")
+    made.beat()
+    clock.now += DEAF
+    assert carry.go() == ""
+    clock.now += 0.1
+    assert "has not answered" in carry.go()
+    made.beat()
+    assert carry.go() == ""
+
+
+@pytest.mark.parametrize(
+    ("start", "sentence"),
+    [([0.0, 0.0, 0.3, 0.0], "within 10 degrees"), ([0.1, 0.0, 0.0, 0.0], "lets go of theta"),
+     ([0.1], "lets go of theta"), ([0.0, 0.0, 0.05, 1.0], "lets go of theta")],
+)  # fmt: skip
+def test_a_start_that_no_hand_gives_is_refused_before_anything_begins(at_work, start, sentence):
+    made, carry, _ = at_work
+    with pytest.raises(BadInput, match=sentence):
+        ask(made, "operator", "start", start=start)
+    assert (made.state, carry.orders) == ("idle", [])
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, 3601.0])
+def test_a_run_is_no_longer_than_an_hour(at_work, seconds):
+    with pytest.raises(BadInput, match="at most 3600 s"):
+        ask(at_work[0], "operator", "start", seconds=seconds)
+
+
+def test_what_a_client_sends_to_a_run_is_bounded(at_work):
+    made, carry, _ = at_work
+    with pytest.raises(BadInput, match="does not run"):
+        ask(made, "operator", "tap", coordinate="theta", speed=1.0)
+    ask(made, "operator", "start")
+    carry.go()
+    for do, fields, sentence in (
+        ("tap", {"coordinate": "phi", "speed": 1.0}, "no coordinate 'phi'"),
+        ("tap", {"coordinate": "theta", "speed": 21.0}, "at most 20"),
+        ("reference", {"value": 2 * math.tau}, "within its travel"),
+        ("poles", {"poles": [1.0, -6.0, -7.0, -8.0]}, "left of 0"),
+        ("poles", {"poles": [-5e3, -6.0, -7.0, -8.0]}, "within 1131"),
+        ("poles", {"poles": [-5.0, -6.0, -7.0]}, "4"),
+        ("poles", {"poles": [-5.0 + 1j, -6.0, -7.0, -8.0]}, "conjugate"),
+    ):
+        with pytest.raises(BadInput, match=sentence):
+            ask(made, "operator", do, **fields)
+    assert felt(made.desk, made.rig.law) == ([], [], None)
+    ask(made, "operator", "tap", coordinate="theta", speed=-2.0)
+    ask(made, "operator", "reference", value=0.5)
+    assert felt(made.desk, made.rig.law) == ([[0.0, -2.0]], [], 0.5)
+
+
+def test_gains_are_those_of_the_poles(at_work, rig):
+    made, carry, _ = at_work
+    ask(made, "operator", "start")
+    carry.go()
+    wanted = [-5.0 + 2j, -5.0 - 2j, -20.0, -4.0]
+    ask(made, "operator", "poles", poles=wanted)
+    linear = rig.model.linear("inverted")
+    closed = np.linalg.eigvals(linear.A - linear.B @ made.requested.K)
+    assert sorted(closed, key=lambda z: (z.real, z.imag)) == pytest.approx(
+        sorted(np.array(wanted), key=lambda z: (z.real, z.imag)), rel=1e-6
+    )
+    with pytest.raises(BadInput, match="not answered yet"):
+        ask(made, "operator", "poles", poles=wanted)
+
+
+def test_hardware_is_not_tapped_and_other_gains_are_confirmed(rig, tmp_path):
+    with station(hardware(rig), tmp_path) as (made, carry, _):
+        ask(made, "operator", "start")
+        carry.go()
+        with pytest.raises(BadInput, match="by hand"):
+            ask(made, "operator", "tap", coordinate="theta", speed=1.0)
+        with pytest.raises(BadInput, match="confirm"):
+            ask(made, "operator", "poles", poles=[-5.0, -6.0, -7.0, -8.0])
+        ask(made, "operator", "poles", poles=[-5.0, -6.0, -7.0, -8.0], confirm=True)
+
+
+def test_hardware_whose_model_is_not_trusted_runs_only_for_a_reason(rig, tmp_path):
+    doubtful = hardware(rig, Basis(level=NOT_TRUSTED, sentence="It explains 40 % of theta."))
+    with station(doubtful, tmp_path) as (made, carry, _):
+        for accept in ("", "  "):
+            with pytest.raises(BadInput, match="explains 40 %"):
+                ask(made, "operator", "start", accept=accept)
+        assert (made.state, carry.orders) == ("idle", [])
+        ask(made, "operator", "start", accept="to see it fall")
+        assert made.state == "starting"
