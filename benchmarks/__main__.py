@@ -27,7 +27,7 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
     "workers", "long", "gpu", "crash", "safety", "dying", "false_stops", "minute", "images", "soak", "jitter", "gym",
-    "at_hand", "quick_lab", "first", "kept", "strangers", "live", "peers", "mutants",
+    "at_hand", "quick_lab", "first", "kept", "strangers", "live", "bench", "peers", "mutants",
 )  # fmt: skip
 APART = ("peers", "mutants")
 """Those that run when they are named, and never among all: what is asked there is not how fast we are."""

@@ -12,6 +12,8 @@ from upright.browser.outbox import Outbox
 from upright.browser.station import Station
 
 SECOND = 1.0
+BEHIND = 0.25
+"""How long a frame is put off at most where this machine is too slow for all of them [s]."""
 MOST = 256
 """Clients of a rig at most."""
 _REMEMBERED = 4096
@@ -27,7 +29,7 @@ class Hub:
         self._step = step_of(station.rig.model.limit, station.rig.model.converter)
         self._next, self._late, self._answered, self._desk = 0, 0, 0, station.desk
         self._shown: Any = None
-        self._when = 0.0
+        self._when = self._sent = 0.0
 
     def join(self, me: str) -> tuple[str, Outbox] | None:
         """A client, as who they were before where `me` is one that was issued here; None where there are too many."""
@@ -71,6 +73,10 @@ class Hub:
             self._scenes()
         if desk is None:
             return
+        now = time.monotonic()
+        if 2 * sum(outbox.behind for outbox in self.clients) > len(self.clients) and now - self._sent < BEHIND:
+            return  # most have not got the last frame yet: the next one holds more
+        self._sent = now
         self._next, rows = desk.since(self._next)
         if not len(rows):
             return

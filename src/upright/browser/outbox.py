@@ -26,6 +26,11 @@ class Outbox:
         self._notes: deque[str] = deque()
         self._more = asyncio.Event()
 
+    @property
+    def behind(self) -> bool:
+        """Whether a frame still waits."""
+        return bool(self._frames)
+
     def frame(self, content: bytes) -> None:
         """Let a frame wait."""
         if len(self._frames) == FRAMES:

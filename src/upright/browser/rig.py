@@ -19,6 +19,7 @@ from upright.designing.run import DesignRequest
 from upright.errors import BadInput
 from upright.files import replace_file
 from upright.gains import Estimator, feedback, filtered, place, prefilter
+from upright.gains.placement import swift_gains
 from upright.gains.requests import read_poles
 from upright.laws import Law, Rule, as_values
 from upright.live.twin import Loop
@@ -82,7 +83,7 @@ class BenchRig:
         return [[z.real, z.imag] for z in np.linalg.eigvals(linear.A - linear.B @ K).tolist()]
 
     def with_poles(self, poles: Sequence[complex]) -> Loop:
-        """The loop with other gains, placed as `upright design` does.
+        """The loop with the gains that `upright design` has for these poles.
 
         Raises
         ------
@@ -94,8 +95,7 @@ class BenchRig:
         if any(not p.real < 0 or abs(p) * self.model.period > 1.0 for p in poles):
             raise BadInput(f"poles lie left of 0, within {1 / self.model.period:.4g} 1/s.")
         linear = self.model.linear(self.at)
-        K = place(linear.A, linear.B, poles).K
-        return _looped(self.model, self.at, self.loop.estimator, K, self.follows)
+        return _looped(self.model, self.at, self.loop.estimator, swift_gains(linear.A, linear.B, poles), self.follows)
 
     @cached_property
     def scene(self) -> dict[str, Any]:
