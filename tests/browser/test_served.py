@@ -105,7 +105,7 @@ def test_there_is_a_list_of_rigs_and_what_each_is_made_of(bench):
     assert "default-src 'none'" in headers["content-security-policy"]
     rig = {"name": "furuta", "title": "furuta", "kind": "TWIN", "state": "idle", "operated": False}
     assert json.loads(text)["rigs"] == [rig]
-    for name in ("drawing.js", "kernel.js", "twin.js", "uPlot.js", "uPlot.css", "tokens.css"):
+    for name in ("drawing.js", "kernel.js", "twin.js", "tokens.css"):
         status, headers, text = got(bench, f"assets/{name}")
         assert (status, len(text) > 500) == (200, True)
         assert headers["content-type"].startswith("text/css" if name.endswith("css") else "text/javascript")

@@ -13,7 +13,7 @@ from upright.browser.lease import PATIENCE
 from upright.browser.messages import ClientRequest
 from upright.browser.station import obey
 from upright.errors import BadInput
-from upright.realtime.process import DEAF
+from upright.realtime.process import BY_HAND, DEAF
 from upright.realtime.session import RunState
 
 
@@ -76,6 +76,33 @@ def test_anybody_stops_it_at_any_time_and_only_the_operator_arms_it_again(at_wor
     assert (made.state, made.why) == ("idle", "")
     ask(made, "operator", "start")
     assert not made.desk.stopping
+
+
+def test_an_operator_ends_a_run_without_a_stop_and_a_stop_meanwhile_is_one(at_work):
+    made, carry, _ = at_work
+    for stopped, state in ((False, "ended"), (True, "stopped")):
+        ask(made, "operator", "start")
+        carry.go()
+        with pytest.raises(BadInput, match="somebody else"):
+            ask(made, "a watcher", "end")
+        assert not made.desk.stopping
+        ask(made, "operator", "end")
+        assert made.desk.stopping
+        if stopped:
+            ask(made, "a watcher", "stop")
+        carry.end(BY_HAND)
+        assert settled(made, lambda m: m.over)
+        assert made.state == state
+
+
+def test_a_fall_on_the_way_to_the_end_is_a_stop(at_work):
+    made, carry, _ = at_work
+    ask(made, "operator", "start")
+    carry.go()
+    ask(made, "operator", "end")
+    carry.end("theta is 31 degrees from where it is to be stabilised: it fell.")
+    assert settled(made, lambda m: m.over)
+    assert (made.state, "it fell" in made.why) == ("stopped", True)
 
 
 def test_what_the_supervisor_stops_stays_stopped(at_work):
