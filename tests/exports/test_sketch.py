@@ -186,6 +186,14 @@ def test_a_law_of_several_commands_is_not_taken_for_one_drive():
     assert "#error" in texts["law/law.ino"]
 
 
+@pytest.mark.parametrize(("unit", "refused"), [("mm/s^2", True), ("rad/s^2", True), ("V", False), ("N m", False)])
+def test_a_law_that_commands_an_acceleration_is_not_put_out_as_a_duty(unit, refused):
+    made = replace(of_law(state_feedback([1.0, 2.0, 3.0, 4.0], PERIOD)), command_unit=unit)
+    sketch = TARGETS["arduino"].write(made, self_test(made), False)["law/law.ino"]
+    assert ("#error" in sketch) is refused
+    assert ("speed += command" in sketch) is refused
+
+
 def set_up(text: str) -> dict[str, str]:
     """What stands between the braces of each table that the owner of a rig sets."""
     return dict(re.findall(r"(\w+)\[[^;]*\] = \{(.*?)\};", text))
