@@ -18,7 +18,7 @@ from upright.laws import Law, Rule, as_values, at_work, state_feedback
 from upright.logs import RunLog
 from upright.logs.layout import RunFile
 from upright.logs.replay import replay
-from upright.logs.whole import log_of
+from upright.logs.whole import RunEvent, log_of
 
 LAW = state_feedback([-1.2, -0.3, 9.1, 1.1], 1e-3, memory=0.5, limit=0.5, command_resolution=0.001)
 
@@ -171,3 +171,20 @@ def rule(line: str, commands: str) -> dict[str, str]:
 
 def replace_law(log: RunLog, law) -> RunLog:
     return replace(log, header=replace(log.header, law=law))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "other gains",
+        "other gains: 3",
+        "other gains: {}",
+        'other gains: {"C": [[1, 2], [3]], "D": 0}',
+        "x: " + "[" * 700,
+    ],
+)
+def test_other_gains_that_a_log_does_not_tell_cannot_be_replayed(text):
+    log = run()
+    event = RunEvent(t=5.1, kind="law", text=text, row=100)
+    with pytest.raises(BadInput, match=r"other gains at 5\.1 s"):
+        replay(replace(log, events=(event,)))

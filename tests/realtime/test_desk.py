@@ -11,6 +11,8 @@ import pytest
 from tests.realtime.rigs import LAW, MODEL, RIG, SAMPLED, staged
 from upright.gains import feedback, filtered, place
 from upright.laws import as_values
+from upright.logs import read_log
+from upright.logs.replay import replay
 from upright.realtime.desk import ROW, ROWS, Desk
 from upright.realtime.session import RunOrder, RunState, carry_out
 from upright.rigs import Fault, Mode, TwinPort
@@ -34,8 +36,6 @@ def carried(tmp_path, act, seconds=0.3, port=None):
 
 
 def test_every_tick_of_a_run_is_on_the_desk_as_it_is_in_the_log(tmp_path):
-    from upright.logs import read_log
-
     end, rows = carried(tmp_path, lambda desk, tick: None)
     log = read_log(tmp_path / "run.mcap")
     assert rows["tick"].tolist() == list(range(1, end.ticks + 1))
@@ -81,6 +81,19 @@ def test_other_gains_answer_the_next_sample_as_if_they_had_read_all_before(tmp_p
     assert np.abs(np.array(before) - after)[changed] > 2 * RIG.converter
 
 
+def test_a_log_whose_gains_were_changed_twice_is_replayed_to_the_last_bit(tmp_path):
+    def act(desk, tick):
+        if tick in (20, 200):
+            assert desk.change(FASTER if tick == 20 else LAW)
+
+    carried(tmp_path, act)
+    log = read_log(tmp_path / "run.mcap")
+    assert replay(log).identical
+    assert replay(log).rows.size == len(log)
+    unchanged = replace(log, events=tuple(event for event in log.events if event.kind != "law"))
+    assert replay(unchanged).differing > 100
+
+
 @pytest.mark.parametrize(
     ("law", "why"),
     [(replace(LAW, D=1e9 * LAW.D), "absurd"), (replace(LAW, C=-LAW.C, D=-LAW.D), "falls"),
@@ -107,7 +120,7 @@ def test_a_change_waits_for_the_answer_to_the_one_before():
     desk = Desk()
     assert desk.change(LAW)
     assert not desk.change(FASTER)
-    assert not Desk().change(replace(LAW, A=np.zeros((40, 40)), B=np.zeros((40, 3)), C=np.zeros((1, 40))))
+    assert not Desk().change(replace(LAW, A=np.zeros((80, 80)), B=np.zeros((80, 3)), C=np.zeros((1, 80))))
 
 
 def test_numbers_that_are_none_are_refused(tmp_path):

@@ -19,6 +19,9 @@ from upright.laws.rule import Numbers, Rule
 
 AtWork = Callable[[float, Sequence[float]], Numbers]
 """Commands for a time since the start [s] and the readings then; remembers what the law remembers."""
+RECENT = 64
+"""Readings from which other gains take their memories, as if they had read them: what a filter of 0.5 had before is
+left by 1e-19."""
 _TERMS = 50  # Python's compiler goes as deep as an expression is long
 
 

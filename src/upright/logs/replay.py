@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from upright.errors import BadInput
 from upright.laws import Law, Rule, as_values, at_work, of_values
+from upright.laws.at_work import RECENT, AtWork
 from upright.logs.whole import RunLog
 
 Array = NDArray[np.float64]
@@ -106,6 +108,7 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
             t=t[begin:known],
             readings=readings[begin:known],
             references=_references(law, log, begin, known),
+            changes=_changes(log, t[begin:known]) if of_log and isinstance(law, Law) else {},
         )
         for begin, known, _ in stretches
         if known > begin  # rows were dropped before its first one
@@ -128,21 +131,28 @@ def replay(log: RunLog, law: Law | Rule | None = None) -> Replay:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stretch:
-    """Rows from one start of the law on: number of the first, times [s], readings, references where they are logged."""
+    """Rows from one start of the law on: number of the first, times [s], readings, references where they are logged,
+    and at which of them it went on by other gains.
+    """
 
     first: int
     t: Array
     readings: Array
     references: Array | None
+    changes: Mapping[int, Mapping[str, Array]]
 
 
 def _commands(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> Array:
     """What the law gives, begun anew with every stretch."""
     commands: list[float] = []
     for rows in stretches:
-        step = at_work(law if rows.references is None else replace(law, references=rows.references))
-        times = rows.t.tolist()
-        for k, (t, readings) in enumerate(zip(times, rows.readings.tolist(), strict=True)):
+        step, running, times, all_readings = _from(law, rows, 0), law, rows.t.tolist(), rows.readings.tolist()
+        for k, (t, readings) in enumerate(zip(times, all_readings, strict=True)):
+            if k in rows.changes:
+                running = replace(running, **rows.changes[k])  # type: ignore[arg-type]
+                step = _from(running, rows, before := max(0, k - RECENT))
+                for j in range(before, k):
+                    step(times[j] - times[0], tuple(all_readings[j]))
             try:
                 u = step(t - times[0], tuple(readings))
             except Exception as error:  # whatever a function of somebody's may raise
@@ -151,6 +161,11 @@ def _commands(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> Array
                 raise BadInput(f"the law of '{file}' gives {len(u)} commands, and the log has one.")
             commands.append(u[0])
     return np.array(commands, dtype=np.float64)
+
+
+def _from(law: Law | Rule, rows: Stretch, first: int) -> AtWork:
+    """The law from one row of a stretch on."""
+    return at_work(law if rows.references is None else replace(law, references=rows.references[first:]))
 
 
 def _in_a_process(law: Law | Rule, stretches: Sequence[Stretch], file: str) -> Array:
@@ -201,6 +216,27 @@ def _references(law: Law | Rule, log: RunLog, begin: int, end: int) -> Array | N
     if not names or law.signal().shape[1] != len(names):
         return None
     return np.column_stack([log.columns[name][begin:end] for name in names])
+
+
+def other_gains(law: Law) -> tuple[str, str]:
+    """Kind and text of the event with which a run goes on by C and D of a law."""
+    return "law", f"other gains: {json.dumps({'C': law.C.tolist(), 'D': law.D.tolist()})}"
+
+
+def _changes(log: RunLog, t: Array) -> dict[int, dict[str, Array]]:
+    """Gains by the row, among those with times t, that is the first behind the event that tells of them."""
+    changes: dict[int, dict[str, Array]] = {}
+    for event in log.events:
+        if event.kind == "law" and t[0] <= event.t < t[-1]:
+            try:
+                stated = json.loads(event.text.partition(": ")[2])
+                gains = {name: np.array(stated[name], dtype=np.float64) for name in ("C", "D")}
+            except (ValueError, KeyError, TypeError, RecursionError):
+                raise BadInput(
+                    f"'{log.file}' goes on by other gains at {event.t:.6g} s, and does not say which."
+                ) from None
+            changes[int(np.searchsorted(t, event.t, side="right"))] = gains
+    return changes
 
 
 def _logged(log: RunLog) -> Law | Rule:

@@ -23,8 +23,8 @@ ROWS = 4096
 """Ticks that the ring holds."""
 ENCODERS = 8
 """Most coordinates of a rig."""
-NUMBERS = 1024
-"""Most numbers of a law."""
+NUMBERS = 64
+"""Most gains of a law."""
 ROW = np.dtype(
     [("number", "<i8"), ("tick", "<i8"), ("late", "<i8"), ("mode", "<i8"), ("faults", "<i8"),
      ("counts", "<i8", (ENCODERS,)), ("command", "<f8"), ("applied", "<f8"), ("again", "<i8")]
@@ -65,7 +65,7 @@ class Desk:
         self._marks[_FOLLOWS] = 1
 
     def change(self, law: Law) -> bool:
-        """Ask for other gains; False while the last change is not answered yet."""
+        """Ask for C and D of a law that has all else alike; False while the last change is not answered."""
         numbers = _numbers(law)
         if self._marks[_CHANGED] != self._marks[_ANSWERED] or len(numbers) > NUMBERS:
             return False
@@ -124,10 +124,9 @@ class Desk:
         law, values = stage.supervisor.law, np.array(self._law[1 : 1 + int(self._law[0])])
         why = "the law that runs has other numbers."
         if isinstance(law, Law) and len(values) == len(_numbers(law)):
-            parts = np.split(values, np.cumsum([getattr(law, name).size for name in "ABC"]))
-            shaped = {n: part.reshape(getattr(law, n).shape) for n, part in zip("ABCD", parts, strict=True)}
+            C, D = (x.reshape(m.shape) for x, m in zip(np.split(values, [law.C.size]), (law.C, law.D), strict=True))
             try:
-                why = stage.supervisor.change(replace(law, **shaped))
+                why = stage.supervisor.change(replace(law, C=C, D=D))
             except UprightError as error:
                 why = str(error)
         self._sentence.value = why.encode()[:_SENTENCE]
@@ -137,4 +136,4 @@ class Desk:
 
 
 def _numbers(law: Law) -> list[float]:
-    return [x for name in "ABCD" for x in getattr(law, name).ravel().tolist()]
+    return [*law.C.ravel().tolist(), *law.D.ravel().tolist()]

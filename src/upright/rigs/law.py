@@ -11,13 +11,12 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.laws import Law, Rule, at_work
+from upright.laws.at_work import RECENT
 from upright.rigs.onboard import MEMORIES
 from upright.rigs.protocol import Capabilities, Limits
 
 STEP_SAMPLES = 100
 """For which one count is held to see what a law's memories add up."""
-RECENT = 64
-"""Readings after which the memories of another law are those of its own, but for 1e-19 of what a filter of 0.5 had."""
 GROWTH = 64 ** (1 / 512)
 """Largest size of a law's own pole: e-fold in no less than 123 samples."""
 

@@ -25,6 +25,7 @@ from upright.control.braking import LONGEST, SPAN, Braking
 from upright.errors import BadInput, RigStopped
 from upright.gains.loop import closed
 from upright.laws import Law, Rule
+from upright.logs.replay import other_gains
 from upright.rig import Rig
 from upright.rigs.board import Board, fault_text
 from upright.rigs.doubts import Doubts
@@ -321,7 +322,7 @@ class Supervisor:
         return self._command
 
     def change(self, law: Law) -> str:
-        """Go on by other gains from the next sample on; why not, as a sentence, or an empty text.
+        """Go on by C and D of a law from the next sample on; why not, as a sentence, or an empty text.
 
         Nothing of the law that runs is changed where they are refused.
 
@@ -336,7 +337,7 @@ class Supervisor:
         if unfit := absurdity(fitted, self.about, self.held) or self._falls(fitted):
             return f"These gains are not applied: {unfit}."
         self.law, self._running = fitted, self._running.going_on(fitted)
-        self.event(self._time, "law", "other gains from here on")
+        self.event(self._time, *other_gains(law))
         return ""
 
     def _since(self, before: Tick, tick: Tick) -> Iterator[tuple[float, list[float]]]:
