@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from itertools import combinations
 
 from matplotlib.axis import Tick
@@ -10,14 +12,14 @@ from matplotlib.text import Text
 from matplotlib.textpath import TextPath
 
 from tests.report.interactive.drawn import drawings
-from upright.report.interactive.charts import Chart
+from upright.report.interactive.charts import Readable
 
 PIXEL = 1.0
 
 
 def unreadable(drawing) -> list[str]:
     """Texts that the edge cuts off, and those outside of the frames that lie on one another."""
-    if isinstance(drawing, Chart):
+    if isinstance(drawing, Readable):
         return [text for svg in drawings(drawing.svg("a")).values() for text in _unreadable_in(svg)]
     FigureCanvasAgg(drawing).draw()
     width, height = drawing.bbox.width, drawing.bbox.height
@@ -60,11 +62,18 @@ def _tick_labels(ax) -> list[Text]:
 def _unreadable_in(svg) -> list[str]:
     """The same of a chart's drawing, in the widest letters that it is shown with."""
     wide = float(svg.get("viewBox").split()[2])
+    above = {child: parent for parent in svg.iter() for child in parent}
     boxes: list[tuple[str, float, float, float]] = []
     for text in svg.iter("text"):
-        long = TextPath((0, 0), text.text, size=float(svg.get("font-size"))).get_extents().width
-        left = float(text.get("x")) - long * {"start": 0.0, "middle": 0.5, "end": 1.0}[text.get("text-anchor", "start")]
-        boxes.append((text.text, left, left + long, float(text.get("y"))))
+        words = "".join(text.itertext())
+        pieces = [(t.text, float(t.get("font-size", svg.get("font-size")))) for t in text.iter() if t.text]
+        long = sum(TextPath((0, 0), part, size=size).get_extents().width for part, size in pieces)
+        anchor = text.get("text-anchor") or above[text].get("text-anchor", "start")
+        turned = [float(part) for part in re.findall(r"-?[\d.]+", text.get("transform", ""))]
+        x, y, angle = turned or (float(text.get("x")), float(text.get("y")), 0.0)
+        share = {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * math.cos(math.radians(angle))
+        # of turned ones, which stand side by side, where they begin
+        boxes.append((words, x - share * long, x - share * long + (0.0 if turned else long), y))
     cut = [f"cut off: {text}" for text, left, right, _ in boxes if left < -PIXEL or right > wide + PIXEL]
     return cut + [
         f"{a[0]} on {b[0]}" for a, b in combinations(boxes, 2) if a[1] < b[2] and b[1] < a[2] and abs(a[3] - b[3]) < 10

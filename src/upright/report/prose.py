@@ -49,7 +49,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from upright.basis import in_percent
-from upright.report.interactive.charts import Chart
+from upright.report.interactive.charts import Readable
 from upright.report.page import Block, Chapter, Code, Part, Picture, Points, Step, Symbol, Table
 from upright.report.symbols import number, percent, plain, typed, unit
 
@@ -68,7 +68,7 @@ _PART = re.compile(r"(.*?)(?: \{(?:(?!folded|aside)(\w+))? ?(folded|aside)?\})?"
 _STEP = re.compile(r"(.*?)(?: `(.*)`)?", re.S)
 
 Placed = Mapping[str, Sequence[Block | Part]]
-Figures = Mapping[str, Callable[[], Any] | tuple[Callable[[], Any], Callable[[], str]] | Chart | None]
+Figures = Mapping[str, Callable[[], Any] | tuple[Callable[[], Any], Callable[[], str]] | Readable | None]
 
 
 def chapter_of(
@@ -83,7 +83,7 @@ def chapter_of(
         Its ``__name__``.
     template : str
         Name of the template without its ending; the module's own when empty.
-    figures : mapping of str to callable, two callables or Chart, optional
+    figures : mapping of str to callable, two callables or Readable, optional
         Each picture that the template places: what draws it, and what answers on a screen; or a chart.
     placed : mapping of str to sequence of Block or Part, optional
         What the template sets by ``[name]`` and ``## [name]``.
@@ -213,7 +213,7 @@ def _block(text: str, figures: Figures) -> Block:
         name, caption, description = match[2], _line(match[3]), _line(match[1])
         drawn = figures[name]
         assert drawn is not None, f"{name} is placed and not drawn"
-        if isinstance(drawn, Chart):
+        if isinstance(drawn, Readable):
             return drawn.picture(name, caption=caption, description=description)
         draw, answers = drawn if isinstance(drawn, tuple) else (drawn, "")
         return Picture(name=name, draw=draw, interactive=answers, caption=caption, description=description)

@@ -13,7 +13,6 @@ from upright.physics import Furuta
 from upright.report.drawing import BLUE, GREY, VERMILLION
 from upright.report.fit.figures import (
     autocorrelation_figure,
-    correlation_figure,
     directions_figure,
     fit_figure,
     interval_figure,
@@ -231,34 +230,6 @@ def test_beside_a_truth_everything_is_told_from_it_and_solid_is_what_holds_it():
 
 def written(ax):
     return {(t.get_position()[0], t.get_position()[1]): (t.get_text(), t.get_weight()) for t in ax.texts}
-
-
-def test_correlations_stand_in_their_cells_and_strong_ones_are_bold(changed):
-    matrix = np.array([[1.0, 0.904, -0.31], [0.904, 1.0, math.nan], [-0.31, math.nan, 1.0]])
-    ax = correlation_figure(changed(names=("m_p", "J_p", "b_1"), correlation=matrix)).axes[0]
-    plain = {(0, 0): "1", (1, 1): "1", (2, 2): "1", (2, 0): "−0.31", (0, 2): "−0.31", (1, 2): "–", (2, 1): "–"}
-    assert written(ax) == {at: (text, "normal") for at, text in plain.items()} | {
-        (1, 0): ("0.90", "bold"), (0, 1): ("0.90", "bold"),
-    }  # fmt: skip
-    cells = ax.collections[0]
-    np.testing.assert_array_equal(np.ma.filled(cells.get_array(), np.nan).reshape(3, 3), matrix)
-    assert cells.get_clim()[0] == -cells.get_clim()[1]  # no correlation is the middle of the colours
-    assert cells.get_clim()[1] >= 1
-    assert ax.get_ylim() == (2.5, -0.5)
-    assert ax.get_xlim() == (-0.5, 2.5)
-    for axis in (ax.xaxis, ax.yaxis):
-        assert axis.get_ticklocs().tolist() == [0, 1, 2]
-        assert [t.get_text() for t in axis.get_ticklabels()] == [
-            "$m_{\\mathrm{p}}$", "$J_{\\mathrm{p}}$", "$b_{\\mathrm{1}}$",
-        ]  # fmt: skip
-
-
-@pytest.mark.parametrize(("n", "turned"), [(7, 0.0), (8, 45.0)])
-def test_many_names_below_a_matrix_are_turned(changed, n, turned):
-    fit = changed(names=tuple(f"k_{i}" for i in range(n)), correlation=np.full((n, n), 0.9) + 0.1 * np.eye(n))
-    ax = correlation_figure(fit).axes[0]
-    assert {t.get_rotation() for t in ax.get_xticklabels()} == {turned}
-    assert {weight for _, weight in written(ax).values()} == {"normal"}  # bold is what lies above 0.9
 
 
 def test_singular_values_stand_beside_the_combination_that_they_weigh(changed):

@@ -9,6 +9,7 @@ import pytest
 
 from tests.live.browser import opened
 from upright.report.html import write_html
+from upright.report.interactive.cells import Cells
 from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
 from upright.report.page import Chapter, Part
 from upright.report.planes import Poles, pole_chart
@@ -23,12 +24,15 @@ MOTION = Chart(
 )  # fmt: skip
 POLES = np.array([-3 + 4j, -3 - 4j, -12.0, 2.0])
 PLANE = pole_chart([Poles(name="loop", values=POLES, mark="x")])
+MATRIX = np.array([[1.0, 0.904, -0.31], [0.904, 1.0, math.nan], [-0.31, math.nan, 1.0]])
+CELLS = Cells(names=("m_p", "J_p", "b_1"), matrix=MATRIX)
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     pictures = (MOTION.picture("motion", caption="A motion.", description="Sine and cosine."),
-                PLANE.picture("plane", caption="Poles.", description="Four poles."))  # fmt: skip
+                PLANE.picture("plane", caption="Poles.", description="Four poles."),
+                CELLS.picture("cells", caption="Correlations.", description="Three numbers."))  # fmt: skip
     page = Chapter(title="Charts", verdict="Read them.", parts=(Part("Pictures", pictures),))
     return write_html(tmp_path_factory.mktemp("charts") / "page.html", page)
 
@@ -100,11 +104,33 @@ def test_a_finger_reads_the_pole_that_it_touches(written):
         assert wrong == []
 
 
+@pytest.mark.parametrize("width", [360, 1280])
+def test_a_cell_tells_its_pair_wherever_in_it_the_mouse_is(written, width):
+    heard = {(0, 1): "m_p and J_p: 0.904", (2, 0): "b_1 and m_p: -0.310", (1, 2): "J_p and b_1: not known"}
+    with opened(written, width=width) as (page, wrong):
+        svg = page.locator(".read[aria-label='Three numbers.'] svg:visible")
+        svg.scroll_into_view_if_needed()
+        box = svg.bounding_box()
+        units = svg.evaluate("e => e.viewBox.baseVal.width")
+        left, top, wide, high = map(float, svg.locator(".panel").get_attribute("data-area").split())
+        for (i, j), pair in heard.items():
+            for inside in (0.1, 0.9):
+                x, y = left + (j + inside) * wide / 3, top + (i + inside) * high / 3
+                page.mouse.move(box["x"] + x * box["width"] / units, box["y"] + y * box["width"] / units)
+                assert told(page, "Three numbers.") == f"correlation of {pair}"
+        page.locator(".read[aria-label='Three numbers.']").focus()
+        page.keyboard.press("Home")
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("ArrowRight")
+        assert told(page, "Three numbers.") == "correlation of J_p and J_p: 1.000"
+        assert wrong == []
+
+
 def test_without_a_script_and_on_paper_the_drawing_for_its_width_is_there(written):
     for width, kind in ((360, "narrow"), (1280, "wide")):
         with opened(written, width=width, script=False) as (page, _):
             shown = page.locator(".chart svg:visible")
-            assert [s.get_attribute("class") for s in shown.all()] == [kind] * 2
+            assert [s.get_attribute("class") for s in shown.all()] == [kind] * 3
     with opened(written) as (page, _):
         page.emulate_media(media="print")
         assert page.locator(".chart-reading:visible").count() == 0

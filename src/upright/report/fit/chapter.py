@@ -13,7 +13,7 @@ from upright.identification.ladder.cross_validation import CrossValidation
 from upright.identification.model.fit import Fit
 from upright.report.fit.advice import fit_steps
 from upright.report.fit.equations import equations
-from upright.report.fit.figures import correlation_figure, directions_figure, interval_figure, path_figure
+from upright.report.fit.figures import directions_figure, interval_figure, path_figure
 from upright.report.fit.interactive import path_traces, search_path
 from upright.report.fit.pictures import rest_picture, run_pictures
 from upright.report.fit.tables import (
@@ -25,6 +25,7 @@ from upright.report.fit.tables import (
     run_table,
     score_table,
 )
+from upright.report.interactive.cells import Cells
 from upright.report.page import Assessment, Block, Chapter, Facts, Formula, KeyNumber, Part, Picture, Symbol
 from upright.report.planes import fitted_poles_chart
 from upright.report.prose import chapter_of, templates_of
@@ -70,7 +71,7 @@ def chapter(
         figures={
             "fit-poles": fitted_poles_chart(fit.poles) if poles.rows else None,
             "fit-intervals": lambda: interval_figure(fit.estimates),
-            "fit-correlation": lambda: correlation_figure(fit),
+            "fit-correlation": Cells(names=fit.names, matrix=fit.correlation),
             "fit-directions": lambda: directions_figure(fit),
             "fit-search": (lambda: path_figure(*search_path(fit)), lambda: path_traces(fit)),
         },

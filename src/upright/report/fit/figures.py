@@ -218,29 +218,6 @@ def interval_figure(estimates: Mapping[str, Estimate], *, truth: Mapping[str, fl
     return drawing
 
 
-@styled
-def correlation_figure(fit: Fit) -> Figure:
-    """Correlation matrix of the estimates as numbers on colour."""
-    n = len(fit.names)
-    drawing = figure(0.7 + 0.36 * n, min(7.4, 1.6 + 0.55 * n))
-    ax = drawing.add_subplot()
-    _cells(ax, fit.correlation)
-    for i in range(n):
-        for j in range(n):
-            r = float(fit.correlation[i, j])
-            strong = abs(r) > 0.9 and i != j
-            ax.text(
-                j, i, _correlation(r), ha="center", va="center", fontsize=8.5, weight="bold" if strong else "normal"
-            )
-    names = [mathtext(name) for name in fit.names]
-    ax.set_xticks(range(n), names, rotation=45 if n > 7 else 0, ha="right" if n > 7 else "center")
-    ax.set_yticks(range(n), names)
-    ax.grid(visible=False)
-    ax.spines[:].set_visible(False)
-    ax.tick_params(length=0)
-    return drawing
-
-
 def _cells(ax: Axes, matrix: Array) -> None:
     """Colour per entry, pale enough for black figures on it, row 0 at the top."""
     rows, columns = matrix.shape

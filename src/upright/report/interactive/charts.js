@@ -65,8 +65,8 @@
     }
 
     pressed(event) {
-      const now = this.index ?? -1, last = this.stops.length - 1;
-      const to = { ArrowLeft: now - 1, ArrowDown: now - 1, ArrowRight: now + 1, ArrowUp: now + 1, PageUp: now + 10, PageDown: now - 10, Home: 0, End: last }[event.key];
+      const now = this.index ?? -1, last = this.stops.length - 1, below = this.chart.plane === "cells" ? Math.sqrt(last + 1) : -1;
+      const to = { ArrowLeft: now - 1, ArrowDown: now + below, ArrowRight: now + 1, ArrowUp: now - below, PageUp: now + 10, PageDown: now - 10, Home: 0, End: last }[event.key];
       if (to === undefined) return;
       event.preventDefault();
       this.go(Math.min(Math.max(to, 0), last));
@@ -103,6 +103,7 @@
     }
 
     pole({ line, i, x, y }) {
+      if (this.chart.plane === "cells") return `${this.chart.chart} of ${line.name} and ${line.notes[i]}`;
       const size = Math.hypot(x, y), pair = Math.abs(y) > 1e-9 * size;
       const what = pair ? `${shown(x)} ± ${shown(Math.abs(y))} i 1/s, natural frequency ${shown(size)} rad/s, damping ratio ${shown(-x / size)}` : `${shown(x)} 1/s`;
       return `${line.name || "point"}: ${what}${line.notes ? `, ${line.notes[i]}` : ""}`;
@@ -121,7 +122,10 @@
       };
       const ring = (x, y, i) => {
         const [cx, cy] = this.place(x, y, i, seen.areas), [left, top, wide, high] = seen.areas[i];
-        if (cx >= left - 1 && cx <= left + wide + 1 && cy >= top - 1 && cy <= top + high + 1) add("circle", { cx, cy, r: this.chart.plane ? 9 : 4.5 });
+        if (this.chart.plane === "cells") {
+          const n = stop.line.x.length, [w, h] = [wide / n, high / n];
+          add("rect", { x: cx - w / 2, y: cy - h / 2, width: w, height: h });
+        } else if (cx >= left - 1 && cx <= left + wide + 1 && cy >= top - 1 && cy <= top + high + 1) add("circle", { cx, cy, r: this.chart.plane ? 9 : 4.5 });
       };
       if (this.chart.plane) ring(stop.x, stop.y, stop.panel);
       else {

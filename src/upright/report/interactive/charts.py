@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -28,7 +29,7 @@ COLOURS = {
 """Custom properties of a page, and what stands for them elsewhere."""
 WIDTHS = {"wide": 640.0, "narrow": 330.0}
 """Units of a drawing: about the CSS pixels of the column that it stands in."""
-_TEXT, _LETTER = 13.0, 7.4  # units of text and of one of its letters, on average and with room to spare
+TEXT, LETTER = 13.0, 7.4  # units of text and of one of its letters, on average and with room to spare
 _LEFT, _RIGHT, _HEAD, _FOOT, _BETWEEN, _ROW = 50.0, 14.0, 20.0, 40.0, 8.0, 19.0
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _OFF = 0.1  # units by which a drawn curve may miss its samples: a tenth of a pixel
@@ -106,8 +107,42 @@ class ChartPanel:
     places: tuple[tuple[float, str], ...] = ()
 
 
+class Readable(ABC):
+    """A drawing of our own that a cursor reads."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """What it shows, in a word or two."""
+
+    @abstractmethod
+    def svg(self, name: str) -> str:
+        """Markup for the widest column and for a phone, of which a page shows one; ids begin with `name`."""
+
+    @abstractmethod
+    def values(self) -> str:
+        """What ``charts.js`` reads, as JSON that may stand inside a script."""
+
+    def picture(self, name: str, *, caption: str, description: str) -> Picture:
+        """It, with its caption, for a chapter."""
+        return Picture(name=name, draw=lambda: self, interactive=self.values, caption=caption, description=description)
+
+    def save(self, path: Path) -> Path:
+        """Write the drawing for a desk by itself, as SVG."""
+        from upright.files import replace_file
+        from upright.report.pdf import standalone
+
+        return replace_file(path, standalone(self.svg("chart"))[0].encode())
+
+    def _repr_html_(self) -> str:
+        """It in a notebook, where a cursor reads it as in a page."""
+        from upright.report.html import picture_in_notebook
+
+        return picture_in_notebook(self.picture("chart", caption="", description=self.label))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Chart:
+class Chart(Readable):
     """Panels one below the other over one abscissa.
 
     Attributes
@@ -144,7 +179,7 @@ class Chart:
         object.__setattr__(self, "spans", spans)
 
     def svg(self, name: str) -> str:
-        """Markup for the widest column and for a phone, of which a page shows one; ids begin with `name`."""
+        """Markup for the widest column and for a phone."""
         return f'<div class="chart">{"".join(_Drawing(self, kind, name).markup() for kind in WIDTHS)}</div>'
 
     @property
@@ -153,7 +188,7 @@ class Chart:
         return (f"{self.x} [{self.unit}]" if self.unit else self.x) + self.note
 
     def values(self) -> str:
-        """What ``charts.js`` reads, as JSON that may stand inside a script."""
+        """Values by panel and line."""
         content: dict[str, Any] = {
             "chart": self.x, "unit": self.unit, "span": self.span, "logarithmic": self.logarithmic, "plane": self.plane,
             "panels": [
@@ -165,24 +200,7 @@ class Chart:
                 for p, span in zip(self.panels, self.spans, strict=True)
             ],
         }  # fmt: skip
-        return json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-
-    def picture(self, name: str, *, caption: str, description: str) -> Picture:
-        """It, with its caption, for a chapter."""
-        return Picture(name=name, draw=lambda: self, interactive=self.values, caption=caption, description=description)
-
-    def save(self, path: Path) -> Path:
-        """Write the drawing for a desk by itself, as SVG."""
-        from upright.files import replace_file
-        from upright.report.pdf import standalone
-
-        return replace_file(path, standalone(self.svg("chart"))[0].encode())
-
-    def _repr_html_(self) -> str:
-        """It in a notebook, where a cursor reads it as in a page."""
-        from upright.report.html import picture_in_notebook
-
-        return picture_in_notebook(self.picture("chart", caption="", description=self.label))
+        return in_script(content)
 
 
 def round_ticks(low: float, high: float, most: int) -> list[float]:
@@ -221,11 +239,17 @@ def _range(every: Sequence[ArrayLike], logarithmic: bool, room: float = 0.07) ->
     return (low - room * wide, high + room * wide) if high > low else (low - wide / 2, high + wide / 2)
 
 
+def in_script(content: dict[str, Any]) -> str:
+    """JSON that may stand inside a script."""
+    return json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
 def _digits(values: Array) -> list[float | None]:
     return [float(f"{v:.5g}") if math.isfinite(v) else None for v in values.tolist()]
 
 
-def _colour(name: str) -> str:
+def page_colour(name: str) -> str:
+    """One of `COLOURS` as an attribute of SVG takes it."""
     return f"var(--{name}, {COLOURS[name]})"
 
 
@@ -256,7 +280,7 @@ class _Drawing:
             y += _HEAD + high + (_BETWEEN if panel is not chart.panels[-1] else _FOOT)
         hidden = ' style="display:none"' if self.kind != "wide" else ' style="max-width:88%"'
         return (
-            f'<svg class="{self.kind}" viewBox="0 0 {self.wide:g} {y:g}"{hidden} font-size="{_TEXT:g}" '
+            f'<svg class="{self.kind}" viewBox="0 0 {self.wide:g} {y:g}"{hidden} font-size="{TEXT:g}" '
             f'aria-hidden="true" focusable="false">{"".join(self.out)}</svg>'
         )
 
@@ -267,7 +291,7 @@ class _Drawing:
             return 0.0
         x, y = 0.0, 14.0
         for name, line in named.items():
-            wide = 34 + _LETTER * len(name)
+            wide = 34 + LETTER * len(name)
             if x > 0 and x + wide > self.wide:
                 x, y = 0.0, y + _ROW
             at = np.array([x + 3, x + 21]) if not line.mark else np.array([x + 12])
@@ -346,7 +370,7 @@ class _Drawing:
             if text and span[0] <= value <= span[1]:
                 self._text(right - 3, y - 4 if y > top + 18 else y + 14, text, anchor="end", colour="care")
         for k, (value, text) in enumerate(panel.places):
-            x, room = float(self._x(value)), _LETTER * len(text) + 6
+            x, room = float(self._x(value)), LETTER * len(text) + 6
             if text and _LEFT <= x <= right:
                 left = x + room > right
                 self._text(
@@ -374,8 +398,8 @@ class _Drawing:
         w = 5.0 if len(points) <= _MANY else 3.4
         for a, b in points:
             if line.mark in "op":
-                r, inside = (1.1 * w, "none") if line.mark == "o" else (3.2, _colour("raised"))
-                ring = f'stroke="{_colour(line.colour)}" stroke-width="1.6" fill="{inside}"'
+                r, inside = (1.1 * w, "none") if line.mark == "o" else (3.2, page_colour("raised"))
+                ring = f'stroke="{page_colour(line.colour)}" stroke-width="1.6" fill="{inside}"'
                 self.out.append(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{r:.2g}" {ring}/>')
                 continue
             path = _MARKS[line.mark].format(
@@ -386,7 +410,11 @@ class _Drawing:
     def _shape(
         self, path: str, colour: str, *, width: float = 1.0, dash: str = "", opacity: float = 1.0, fill: bool = False
     ) -> None:
-        paint = f'fill="{_colour(colour)}" fill-opacity="0.09"' if fill else f'fill="none" stroke="{_colour(colour)}"'
+        paint = (
+            f'fill="{page_colour(colour)}" fill-opacity="0.09"'
+            if fill
+            else f'fill="none" stroke="{page_colour(colour)}"'
+        )
         more = f' stroke-dasharray="{dash}"' * bool(dash) + f' stroke-opacity="{opacity:g}"' * (opacity < 1)
         more += f' stroke-width="{width:g}"' * (width != 1.0) + ' stroke-linecap="round"' * (width >= 2)
         if path:
@@ -396,9 +424,9 @@ class _Drawing:
         self, x: float, y: float, text: str, *, anchor: str = "start", colour: str = "ink-2", bold: bool = False
     ) -> None:
         more = f' text-anchor="{anchor}"' * (anchor != "start") + ' font-weight="600"' * bold
-        more += f' paint-order="stroke" stroke="{_colour("paper")}" stroke-width="4"' * (colour != "ink-2")
+        more += f' paint-order="stroke" stroke="{page_colour("paper")}" stroke-width="4"' * (colour != "ink-2")
         self.out.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" fill="{_colour("ink" if bold else colour)}"{more}>{escape(text)}</text>'
+            f'<text x="{x:.1f}" y="{y:.1f}" fill="{page_colour("ink" if bold else colour)}"{more}>{escape(text)}</text>'
         )
 
 
