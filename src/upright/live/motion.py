@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 
 from upright.errors import BadInput
-from upright.live.page import in_script, page_source, source_hash, still
+from upright.live.page import page_source, source_hash, still
 from upright.physics import Plant
 from upright.physics.outline import in_javascript
 from upright.records import Array
 from upright.report.html import rendered
+from upright.report.interactive.script import in_script
 from upright.report.interactive.traces import extreme_rows, packed
 from upright.report.symbols import plain
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -15,6 +14,7 @@ from upright.live import SCRIPTS
 from upright.live.twin import LONGEST_DELAY
 from upright.physics import Plant
 from upright.report.html import rendered
+from upright.report.interactive.script import in_script as in_script
 
 
 def page(
@@ -101,11 +101,6 @@ def still(plant: Plant, q: Sequence[float]) -> tuple[str, str]:
 def page_source(name: str) -> str:
     """A script or a style of this room."""
     return files("upright.live").joinpath(name).read_text(encoding="utf-8")
-
-
-def in_script(data: Mapping[str, Any]) -> str:
-    """JSON that may stand inside a script."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def source_hash(text: str) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from upright.report.interactive.charts import LETTER, TEXT, WIDTHS, Array, Readable, in_script, page_colour
+from upright.report.interactive.charts import LETTER, TEXT, WIDTHS, Array, Readable, page_colour
+from upright.report.interactive.script import in_script
 from upright.report.symbols import parts
 
 _TALLEST = 34.0

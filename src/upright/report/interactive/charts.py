@@ -5,7 +5,6 @@ A chart stands without a script and on paper; ``charts.js`` adds a cursor for mo
 
 from __future__ import annotations
 
-import json
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from upright.report.interactive.script import in_script
 from upright.report.page import Picture
 
 Array = NDArray[np.float64]
@@ -237,11 +237,6 @@ def _range(every: Sequence[ArrayLike], logarithmic: bool, room: float = 0.07) ->
         return low / 10 ** (room * wide), high * 10 ** (room * wide)
     wide = (high - low) or abs(high) or 1.0
     return (low - room * wide, high + room * wide) if high > low else (low - wide / 2, high + wide / 2)
-
-
-def in_script(content: dict[str, Any]) -> str:
-    """JSON that may stand inside a script."""
-    return json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _digits(values: Array) -> list[float | None]:

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 _COMMENTS = re.compile(r"^\s*//.*\n|^\s+", re.MULTILINE)
 _BANNER = "/* uPlot 1.6.32, copyright (c) 2022 Leon Sorokin, MIT License */\n"
+
+
+def in_script(data: Mapping[str, Any]) -> str:
+    """JSON that may stand inside a script."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 @cache

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from upright.report.interactive.script import in_script
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def traces(
         "name": name, "axis": axis, "unit": unit, "of": int(t.size), "restarts": restarts, **_times(t, rows),
         "panels": [{**_panel(p, rows), "logarithmic": p.name in logarithmic} for p in panels],
     }  # fmt: skip
-    return json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return in_script(content)
 
 
 def extreme_rows(deciding: Sequence[Array], samples: int, most: int) -> NDArray[np.int64]:
