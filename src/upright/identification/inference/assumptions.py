@@ -116,8 +116,8 @@ def _over_ranges(interval: tuple[float, float], name: str, rested: Sequence[Assu
 def _ratios(a: Assumption, rested: Sequence[Assumption], estimates: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """What is known whatever one assumed number is; each holds what the other assumed ones may be."""
     others = [b for b in rested if b.name != a.name]
-    asked = [n for n in proportional(a) if not n.startswith(NOISE)]
-    per = {n: f"{n}/{a.name.removeprefix('actuator.')}" for n in asked}
+    growing = [n for n in proportional(a) if not n.startswith(NOISE)]
+    per = {n: f"{n}/{a.name.removeprefix('actuator.')}" for n in growing}
     lumped = {n: name for n, name in STANDS_FOR.get(a.name, {}).items() if a.value == 0 and n in a.follows}
     out: dict[str, Estimate] = {}
     for n, name in {**per, **lumped}.items():
