@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from websockets.sync.client import connect
 
 from tests.realtime.rigs import BLANK, put_out
 from tests.realtime.test_process import ours, until
+from upright.browser.serve import open_bench
+from upright.logs import read_log
+from upright.logs.replay import replay
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")]
 ROOT = Path(__file__).parents[2]
@@ -53,7 +57,8 @@ def server(tmp_path):
     yield process, tmp_path / "out"
     process.send_signal(signal.SIGCONT)
     process.kill()
-    process.communicate()  # ends with the last process that holds its output, which is the loop's
+    if not process.stdout.closed:
+        process.communicate()  # ends with the last process that holds its output, which is the loop's
 
 
 @contextmanager
@@ -157,3 +162,48 @@ def test_a_loop_that_is_killed_is_a_stop_with_a_sentence(server):
             if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
                 os.kill(pid, signal.SIGKILL)
         assert "was killed" in state_of(socket, "stopped")["why"]
+
+
+def test_the_command_prints_its_address_and_ctrl_c_ends_it_with_every_rig_at_rest(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "upright", "bench", "--port", "0", "--no-browser", "--no-fifo", "-o", "out"],
+        env=ours(), cwd=tmp_path, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    process.url = process.stdout.readline().split()[-1]
+    with started(process) as socket:
+        state_of(socket, "running")
+        process.send_signal(signal.SIGINT)
+        assert "closed" in state_of(socket, "stopped")["why"]
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+    log = read_log(tmp_path / "out" / "furuta" / "run.mcap")
+    assert not log.complaint
+    assert log.events[-1].kind == "fault"
+
+
+def test_a_run_in_the_browser_is_kept_with_a_report_and_replays_to_the_last_bit(tmp_path):
+    """Tapped, given other poles and another reference, then ended by its operator."""
+    with open_bench([], [], tmp_path, fifo=False) as bench:
+        with started(bench) as socket:
+            poles = bench.stations[0].rig.scene["poles"]
+            state_of(socket, "running")
+            for message in (
+                {"do": "tap", "coordinate": "theta", "speed": 0.2},
+                {"do": "poles", "poles": [[1.1 * re, 1.1 * im] for re, im in poles]},
+                {"do": "reference", "value": 0.3},
+            ):
+                socket.send(json.dumps(message))
+                state_of(socket, "running")
+            socket.send(json.dumps({"do": "end"}))
+            while not (note := state_of(socket, "ended"))["verdict"]:
+                pass
+        runs = json.loads(urllib.request.urlopen(bench.url + "api/rigs/furuta/runs").read())
+        assert [run["verdict"] for run in runs] == [note["verdict"]]
+        page = urllib.request.urlopen(bench.url.rstrip("/") + runs[0]["report"]).read().decode()
+        assert "other gains" in page
+        content = urllib.request.urlopen(bench.url.rstrip("/") + runs[0]["log"]).read()
+    (tmp_path / "fetched.mcap").write_bytes(content)
+    log = read_log(tmp_path / "fetched.mcap")
+    assert "law" in [event.kind for event in log.events]
+    assert max(log.columns["reference"]) == 0.3
+    assert replay(log).identical
