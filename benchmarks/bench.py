@@ -60,8 +60,12 @@ def _served(watchers: int, seconds: float) -> tuple[dict[str, Any], dict[str, li
         taken = _taken(bench.stations[0], ours)
         counted = ours.recv()
         clients.join()
+    if len(taken) != len(counted["sent"]):
+        raise RuntimeError(
+            f"of {len(counted['sent'])} clicks the loop took {len(taken)}, so that no two belong together"
+        )
     late: dict[str, list[float]] = {"tap": [], "poles": []}
-    for (kind, sent), arrived in zip(counted["sent"], taken, strict=False):
+    for (kind, sent), arrived in zip(counted["sent"], taken, strict=True):
         late[kind].append(1e-9 * arrived - sent)
     return counted, late, ends[0]
 

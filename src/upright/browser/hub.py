@@ -29,6 +29,7 @@ class Hub:
         self._step = step_of(station.rig.model.limit, station.rig.model.converter)
         self._next, self._late, self._answered, self._desk = 0, 0, 0, station.desk
         self._shown: Any = None
+        self._scene = self._described()
         self._when = self._sent = 0.0
 
     def join(self, me: str) -> tuple[str, Outbox] | None:
@@ -42,7 +43,7 @@ class Hub:
         outbox = Outbox()
         self.clients[outbox] = who
         self.station.lease.back(who)
-        outbox.note(self._scene(who))
+        outbox.note(self._scene_of(who))
         outbox.note(json.dumps(self.station.described(who)))
         return who, outbox
 
@@ -63,8 +64,10 @@ class Hub:
         now = time.monotonic()
         if now_so != self._shown or now - self._when >= SECOND:
             self._shown, self._when = now_so, now
+            holder = station.lease.holder
+            own, others = (json.dumps(station.described(who)) for who in (holder, ""))
             for outbox, who in self.clients.items():
-                outbox.note(json.dumps(station.described(who)))
+                outbox.note(own if who == holder else others)
 
     def _samples(self) -> None:
         desk = self.station.desk
@@ -104,13 +107,17 @@ class Hub:
         self._scenes()
 
     def _scenes(self) -> None:
+        self._scene = self._described()
         for outbox, who in self.clients.items():
-            outbox.note(self._scene(who))
+            outbox.note(self._scene_of(who))
 
-    def _scene(self, who: str) -> str:
+    def _described(self) -> str:
         rig, loop = self.station.rig, self.station.loop
         changed = {} if loop is None else {"poles": rig.poles(loop.K), "K": loop.K[0].tolist()}
-        return json.dumps({**rig.scene, **changed, "you": who})
+        return json.dumps({**rig.scene, **changed})
+
+    def _scene_of(self, who: str) -> str:
+        return f'{self._scene[:-1]}, "you": {json.dumps(who)}}}'
 
     def everybody(self, note: dict[str, Any]) -> None:
         """Send a note to all."""

@@ -28,6 +28,7 @@ from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.rigfile import RigFile, read_rig_file
 from upright.running.rig import model_and_truth, read_law
+from upright.systems import StateSpace
 
 MEMORY = 0.5
 """Of the filter that gives speeds, where nobody chose another."""
@@ -77,9 +78,14 @@ class BenchRig:
         """Equilibrium that is held."""
         return self.file.at if self.file.at in self.model.plant.equilibria else self.zero
 
+    @cached_property
+    def linear(self) -> StateSpace:
+        """Its linear model about what is held."""
+        return self.model.linear(self.at)
+
     def poles(self, K: Array) -> list[list[float]]:
         """Poles of continuous feedback of the states [1/s], as pairs."""
-        linear = self.model.linear(self.at)
+        linear = self.linear
         return [[z.real, z.imag] for z in np.linalg.eigvals(linear.A - linear.B @ K).tolist()]
 
     def with_poles(self, poles: Sequence[complex]) -> Loop:
@@ -94,7 +100,7 @@ class BenchRig:
             raise BadInput(f"the law of {self.name} is no feedback of states, so that its poles cannot be placed.")
         if any(not p.real < 0 or abs(p) * self.model.period > 1.0 for p in poles):
             raise BadInput(f"poles lie left of 0, within {1 / self.model.period:.4g} 1/s.")
-        linear = self.model.linear(self.at)
+        linear = self.linear
         return _looped(self.model, self.at, self.loop.estimator, swift_gains(linear.A, linear.B, poles), self.follows)
 
     @cached_property
