@@ -8,11 +8,12 @@ from math import pi
 import numpy as np
 import pytest
 
+import upright as up
 from tests.live.node import in_node, needs_node
 from tests.physics.specimens import SPECIMENS
 from tests.simulation.kernel.test_interpreted import CASES, DT, FURUTA, LATE, SAMPLES, linear
 from upright.errors import BadInput
-from upright.laws import Law, state_feedback
+from upright.laws import Law, Rule, state_feedback
 from upright.live.kernel import SCRIPT, described
 from upright.simulation import Simulator, choose
 from upright.simulation.lowering import machine, webassembly
@@ -115,6 +116,37 @@ def test_a_reduced_ensemble_is_the_processors():
     law = state_feedback([-0.2, -3.0, -0.1, -0.3], DT, memory=0.7, target=[0.0, pi], resolution=1e-3)
     simulator, params, x0, u = ready(FURUTA, {**LATE, "b_1c": 0.02}, loop=law, lanes=19, record=False, strict=True)
     assert np.array_equal(simulator.run(params, x0, u, samples=SAMPLES), stepped_in_node(simulator, params, x0, u))
+
+
+@needs_node
+@pytest.mark.parametrize("law", [None, linear(1)], ids=["free", "law"])
+def test_a_log_that_says_strict_has_the_samples_of_a_page(law, tmp_path):
+    """Another compiler's machine, without fused operations: 400 ms with dry friction and an arm that sticks."""
+    plant = FURUTA.replace(b_1c=0.02)
+    aside = {"theta": 0.7, "psi_dot": 0.4}
+    log = up.simulate(plant, law, start=aside, seconds=(SAMPLES - 1) * DT, dt=DT, at="hanging", strict=True)
+    values = plant.parameters()
+    derived = plant.derived_for(values)
+    simulator = Simulator(derived=derived, flavour=choose(derived, values, loop=law, strict=True), dt=DT, substeps=2,
+                          loop=law)  # fmt: skip
+    x0 = plant.state("hanging")[:, None] + np.array([[0.0], [0.4], [0.7], [0.0]])
+    there = stepped_in_node(simulator, simulator.table(values, 1), x0, None)[:, :4, 0]
+    assert np.array_equal(np.column_stack([log[name] for name in plant.state_names()]), there)
+    assert "every processor gives the same samples" in log.provenance.notes[-1]
+    log.to_csv(tmp_path / "log.csv")
+    assert "every processor gives the same samples" in (tmp_path / "log.csv").read_text(encoding="utf-8")
+    usual = up.simulate(plant, law, start=aside, seconds=0.1, dt=DT, at="hanging")
+    assert not any("same samples" in note for note in usual.provenance.notes)
+
+
+def test_a_motion_that_needs_the_c_library_is_not_called_strict():
+    def root(t, y, r, z, p):
+        return (-(abs(y[1]) ** 0.7),), ()
+
+    with pytest.raises(BadInput, match="the C library's pow are each system's own"):
+        up.simulate(FURUTA, Rule(function=root), at="hanging", seconds=0.1, dt=DT, strict=True)
+    with pytest.raises(BadInput, match="strict belongs to a rig"):
+        up.simulate(FURUTA.linear("hanging"), strict=True)
 
 
 def test_functions_of_the_c_library_are_named():

@@ -35,6 +35,7 @@ SHORTEST = 1e-12  # s; a step of time below that is none: its inverse overflows,
 CSV_MARK = "# upright record"
 _FORMS = ("control", "csv", "mat", "pandas", "parquet", "xarray")
 SIMULATED_NOTE = "This log was simulated; no rig was touched."
+STRICT_NOTE = "Strict build: every operation was rounded by itself, so that every processor gives the same samples."
 KEY = "upright"  # name of the JSON in attrs, schema metadata and MAT files
 
 

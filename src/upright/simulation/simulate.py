@@ -38,6 +38,7 @@ def simulate(
     held: Mapping[str, Held] | None = None,
     every: int = 1,
     threads: int = 1,
+    strict: bool = False,
 ) -> Array:
     """Motion of a plant in one or many lanes, sample by sample.
 
@@ -77,6 +78,8 @@ def simulate(
         Only each `every`-th sample is returned; `samples` counts what is returned, so `every` multiplies the work.
     threads : int
         Threads among which blocks of 16 lanes are shared.
+    strict : bool
+        Every operation is rounded by itself, in one order: the same bits on every processor.
 
     Returns
     -------
@@ -86,9 +89,14 @@ def simulate(
     Raises
     ------
     BadInput
-        When a name is unknown or missing, or shapes do not fit together.
+        When a name is unknown or missing, shapes do not fit together, or a strict motion needs the C library.
     """
-    job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=True)
+    job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=True, strict=strict)
+    if strict and (called := job.simulator.library()):
+        raise BadInput(
+            f"a strict motion has the same bits everywhere, and the last bits of the C library's {', '.join(called)} "
+            "are each system's own; leave strict out."
+        )
     return job.simulator.run(job.table, job.x0, job.u, samples=samples, start=job.start, every=every, threads=threads)
 
 
@@ -208,10 +216,11 @@ def _prepare(
     held: Mapping[str, Held],
     *,
     record: bool,
+    strict: bool = False,
 ) -> _Job:
     values: dict[str, Any] = {**plant.parameters(), **params} if isinstance(plant, Plant) else dict(params)
     derived: Derived = plant if isinstance(plant, Derived) else plant.derived_for(values)
-    flavour = choose(derived, values, held=held, loop=loop, record=record)
+    flavour = choose(derived, values, held=held, loop=loop, record=record, strict=strict)
     friction = {
         name for j in derived.joints for name in (j.coulomb, j.quadratic, j.stiction, j.stribeck_speed, j.presliding)
     }

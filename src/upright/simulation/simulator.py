@@ -295,6 +295,11 @@ class Simulator:
             take_turns(step, call.blocks, threads)
         return motion[..., : call.lanes]
 
+    def library(self) -> list[str]:
+        """Functions of the C library that the kernel calls, whose last bits are each system's own."""
+        with compiling(self.loop):
+            return self._kernel.library()
+
     def wasm(self, width: int) -> Wasm:
         """The kernel for a page or Node, to be called with what `call` says.
 

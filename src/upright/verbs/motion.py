@@ -15,6 +15,7 @@ from upright.errors import BadInput, nearest
 from upright.laws import Law, Rule, state_feedback
 from upright.physics import Plant
 from upright.records import Record
+from upright.records.record import STRICT_NOTE
 from upright.verbs.answer import Answer
 from upright.verbs.linear.feedback import Gains
 from upright.verbs.linear.matrices import is_linear, linear_model
@@ -56,7 +57,7 @@ def simulate(
     dt : float or str, optional
         Between samples [s]; the period that gains or law are for, else the rig's, else 1 ms.
     **on
-        Of the rig and its loop: limit, counts, memory, actuator; see `MotionOptions`.
+        Of the rig and its loop: limit, counts, memory, actuator, strict; see `MotionOptions`.
 
     Returns
     -------
@@ -75,8 +76,9 @@ def simulate(
     on = known_options(MotionOptions, on, "simulate")
     law = getattr(law, "law", law) if isinstance(law, Answer) else law
     limit, counts, memory, actuator = on.get("limit"), on.get("counts"), on.get("memory", 0.0), on.get("actuator")
+    strict = on.get("strict", False)
     if is_linear(plant):
-        others = {"at": at, "counts": counts, "memory": memory or None, "actuator": actuator}
+        others = {"at": at, "counts": counts, "memory": memory or None, "actuator": actuator, "strict": strict or None}
         for name in [n for n, value in others.items() if value is not None]:
             raise BadInput(f"{name} belongs to a rig, and this is a linear model; leave it out.")
         return _of_linear(linear_model(plant), law, {} if start is None else start, si(seconds, "s"), u, dt, limit)
@@ -118,7 +120,7 @@ def simulate(
     if rig is not None and not isinstance(law, Gains | Law | Rule | None):
         _check_gains(rig, np.atleast_2d(np.asarray(law, dtype=np.float64)), point)
     command = _command(u, t, len(plant.inputs))
-    x = motion(plant, drive, x0, command, dt, samples=samples, substeps=2, loop=loop)[:, :, 0]
+    x = motion(plant, drive, x0, command, dt, samples=samples, substeps=2, loop=loop, strict=strict)[:, :, 0]
     check_bounded(t, x[:, : len(names)], names, ", so this loop does not stabilize the plant")
     signals = {name: x[:, i] for i, name in enumerate(names)}
     put_out = x[:, len(names) :] if loop is not None else command
@@ -129,7 +131,7 @@ def simulate(
         t=t, signals=signals | commands,
         units=dict(zip(names, units, strict=True)) | {i.name: (rig and rig.unit) or i.unit for i in plant.inputs},
         inputs=tuple(commands), outputs=tuple(c.name for c in plant.coordinates),
-        provenance=simulated_origin(type(plant).__name__), plant=plant,
+        provenance=simulated_origin(type(plant).__name__).note(*[STRICT_NOTE] * strict), plant=plant,
     )  # fmt: skip
 
 

@@ -110,12 +110,15 @@ class MotionOptions(TypedDict, total=False):
         Of the low pass on the differences, 0 to below 1; 0 when omitted.
     actuator : mapping, optional
         Numbers of the drive, such as ``{"gain": 0.5, "lag": 2e-3, "delay": 1e-3}``.
+    strict : bool, optional
+        Round every operation by itself, so that every processor gives the same samples; the log says so.
     """
 
     limit: float | str | None
     counts: float | Mapping[str, float] | None
     memory: float
     actuator: Mapping[str, float] | None
+    strict: bool
 
 
 class RunOptions(TypedDict, total=False):

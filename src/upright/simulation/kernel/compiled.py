@@ -106,6 +106,12 @@ class Kernel:
         imports, _, code = self._code(f"wasm {name}", packed).partition(b"\n")
         return webassembly.Wasm(code=code, imports=tuple(imports.decode().split()))
 
+    def library(self) -> list[str]:
+        """Functions of the C library that stepping one motion calls."""
+        module = Module(self.text, 1, together=True, strict=self._strict)
+        module.instance("run_1", RUN)
+        return module.library()
+
     def ptx(self, room: int) -> bytes:
         """Code that steps one motion in each thread of a GPU, with so much `lanes.room`."""
         from upright.simulation.lowering import machine

@@ -17,9 +17,6 @@ KERNEL, THREAD = "lanes", "thread"
 
 _FIRST, _LAST, _TOTAL, _WORK, _ADDRESS = "_b0", "_b1", "_total", "W", "_events"
 
-_NATIVE = ("llvm.fabs.", "llvm.floor.", "llvm.trunc.", "llvm.sqrt.", "llvm.rint.", "llvm.memset.")
-"""What a GPU does by itself of all that LLVM knows by name."""
-
 _PLACES = ("ctaid", "ntid", "tid")
 _DECLARED = "".join(f"declare i32 @llvm.nvvm.read.ptx.sreg.{x}.x()\n" for x in _PLACES)
 _INDEX = [line for x in _PLACES for line in (
@@ -52,8 +49,7 @@ def threads(text: str, entry: str, arguments: Mapping[str, Type], platform: Plat
     """
     module = Module(text, 1, together=True)
     symbol, _ = module.instance(entry, tuple(arguments.values()))
-    missing = sorted({x.removeprefix("llvm.").split(".")[0] for x in module.declared if not x.startswith(_NATIVE)})
-    if missing:
+    if missing := module.library():
         raise BadInput(
             f"a GPU has no C library, and the rule or plant needs {', '.join(missing)} of it; write it with "
             "arithmetic, sqrt, floor, abs and round, or leave device at 'cpu'."

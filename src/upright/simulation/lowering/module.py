@@ -28,6 +28,9 @@ _MARKS = {
 # as wide as there are; LLVM would settle for 256 bits
 _WIDE = 'nounwind "prefer-vector-width"="512" "min-legal-vector-width"="512"'
 
+_NATIVE = ("llvm.fabs.", "llvm.floor.", "llvm.trunc.", "llvm.sqrt.", "llvm.rint.", "llvm.memset.")
+"""What every processor does by itself, and alike, of all that LLVM knows by name."""
+
 ALIGNED = {"W": 64}
 """Arrays that start on a cache line, with their alignment [bytes]."""
 
@@ -73,6 +76,10 @@ class Module:
         self.declared: dict[str, str] = {}
         """What of LLVM and of the C library is called, by name."""
         self._instances: dict[tuple[str, tuple[Type, ...]], tuple[str, Number | TupleOf | None]] = {}
+
+    def library(self) -> list[str]:
+        """Functions of the C library that are called, whose last bits are each system's own."""
+        return sorted({x.removeprefix("llvm.").split(".")[0] for x in self.declared if not x.startswith(_NATIVE)})
 
     def defined(self, name: str) -> ast.FunctionDef | None:
         """The function of that name."""
