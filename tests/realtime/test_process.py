@@ -20,6 +20,7 @@ from tests.realtime.rigs import BLANK, LAW, RIG, put_out, staged, witnessed
 from upright.errors import BadInput, RigStopped, UprightError
 from upright.laws import as_values, of_values
 from upright.logs import read_log
+from upright.realtime.desk import Desk
 from upright.realtime.pace import Virtual, WallClock
 from upright.realtime.priority import LoopPriority
 from upright.realtime.process import _child, _deaf, _Window, run_in_process
@@ -347,13 +348,13 @@ def anywhere(port):
     return replace(whole, supervisor=Supervisor(Board(port), duty))
 
 
-def child(folder, monkeypatch, *, make=None, parent=None, stop=0, paced=False):
+def child(folder, monkeypatch, *, make=None, parent=None, stop=0, paced=False, desk=None, **more):
     """Answer of a loop's process that is this one, the signals that it turned, and the pace that it took."""
     said, turned, paces = [], {}, []
     pipe = SimpleNamespace(send=said.append, close=lambda: said.append("closed"))
     run = RunOrder(
         make=make or partial(anywhere, TwinPort(RIG)), law=as_values(LAW), seconds=5 * RIG.period,
-        log=folder / "run.mcap", check=False, zero=False, fifo=False,
+        log=folder / "run.mcap", check=False, zero=False, fifo=False, **more,
     )  # fmt: skip
 
     def carried(order, *, pace, **more):
@@ -365,7 +366,7 @@ def child(folder, monkeypatch, *, make=None, parent=None, stop=0, paced=False):
                            ("carry_out", carried)):  # fmt: skip
         monkeypatch.setattr(f"upright.realtime.process.{name}", stand_in)
     shared, flags = memory(), [SimpleNamespace(value=stop), SimpleNamespace(value=0)]
-    _child(os.getppid() if parent is None else parent, run, *shared, *flags, pipe, paced)
+    _child(os.getppid() if parent is None else parent, run, *shared, *flags, pipe, paced, desk)
     return said, turned, paces
 
 
@@ -393,6 +394,30 @@ def test_a_paced_loop_waits_for_the_clock_on_the_wall_unless_its_rig_has_a_time_
     assert said[0].warning == "Buy a clock."
     if not virtual:
         assert paces[0][0].period == RIG.period
+
+
+@pytest.mark.parametrize("wall", [True, False])
+def test_a_twin_that_somebody_looks_at_waits_for_the_clock_on_the_wall(tmp_path, monkeypatch, wall):
+    _, _, paces = child(tmp_path, monkeypatch, paced=True, wall=wall)
+    assert isinstance(paces[0][0], WallClock if wall else Virtual)
+
+
+def test_a_loop_shows_every_tick_on_its_desk_and_hears_a_tap_from_there(tmp_path, monkeypatch):
+    desk, felt = Desk(), []
+    desk.tap(1, 0.5)
+    said, _, _ = child(tmp_path, monkeypatch, desk=desk, make=lambda: replace(anywhere(TwinPort(RIG)), tap=felt.append))
+    assert said[0].ticks == 5
+    assert desk.since(0)[1]["tick"].tolist() == [1, 2, 3, 4, 5]
+    assert felt == [[0.0, 0.5]]
+
+
+def test_a_loop_that_is_stopped_on_its_desk_before_it_begins_drives_nothing(tmp_path, monkeypatch):
+    desk, port = Desk(), CountedPort(0)
+    desk.stop()
+    end = child(tmp_path, monkeypatch, desk=desk, make=partial(anywhere, port))[0][0]
+    assert (end.stopped, end.ticks, end.faults) == ("Stopped by hand.", 0, Fault.STOP)
+    assert (port.armed, port.driven) == (0, 0)
+    assert desk.since(0)[1].size == 0
 
 
 def never():

@@ -34,6 +34,7 @@ from upright.rigs.protocol import NO_FAULT, Capabilities, Fault, Limits, LiveRig
 from upright.rigs.still_driven import LOOKED, energy_risen
 from upright.rigs.tick_length import TickLength
 from upright.rigs.twin import TwinPort
+from upright.systems import StateSpace
 
 ALIKE = 1.5
 """Factor by which the response to a pulse may differ from the model's: friction varies, counts do not double."""
@@ -135,6 +136,7 @@ class Supervisor:
     _command: float = field(init=False, default=0.0)
     _stale: int = field(init=False, default=0)
     _mode: Mode = field(init=False, default=Mode.IDLE)
+    _of_model: StateSpace | None = field(init=False, default=None)
 
     def prepare(self, *, zero: bool = True) -> Capabilities:
         """Open the rig, hand limits over and read them back; zero its encoders once it rests.
@@ -506,15 +508,20 @@ class Supervisor:
         model = self.duty.model
         if model is None or isinstance(law, Rule):
             return ""
-        sampled = model.linear(self.duty.at or next(iter(model.plant.equilibria))).to_sampled(model.period,
-                       model.delay / model.period, model.lag)  # fmt: skip
-        largest = float(np.abs(np.linalg.eigvals(closed(sampled, law))).max())
+        largest = float(np.abs(np.linalg.eigvals(closed(self._sampled(model), law))).max())
         if largest < 1.0 + 1e-9:
             return ""
         return (
             f"under this law its model falls, by a factor e every {model.period / math.log(largest):.3g} s; design a "
             "law for this rig (upright design)"
         )
+
+    def _sampled(self, model: Rig) -> StateSpace:
+        """The model as the loop sees it; kept, since other gains are looked at between two ticks."""
+        if self._of_model is None:
+            linear = model.linear(self.duty.at or next(iter(model.plant.equilibria)))
+            self._of_model = linear.to_sampled(model.period, model.delay / model.period, model.lag)
+        return self._of_model
 
     def _shown(self, value: float) -> str:
         unit = "rad" if self.duty.model is None else self.duty.model.plant.coordinates[-1].unit
