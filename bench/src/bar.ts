@@ -70,8 +70,7 @@ export class Bar {
     say(byId("control"), operator === "you" ? "Give up control" : "Take control");
     byId("latch").hidden = connected && phase !== "stopped";
     byId("rearm").hidden = !connected;
-    const reasons = [state?.why, ...(state?.faults ?? [])].filter((s, i, all) => s && all.indexOf(s) === i);
-    say(byId("latch-why"), !connected ? LOST : phase === "stopped" ? reasons.join(" ") : "");
+    say(byId("latch-why"), !connected ? LOST : phase === "stopped" ? state?.why || `Stopped: ${state?.faults.join("; ")}.` : "");
   }
 
   clock(): void {

@@ -109,8 +109,8 @@ export class Design {
     this.plane?.show(this.groups);
     this.groups.forEach((group, k) => {
       const [frequency, ratio] = this.rows[k]!, poles = polesOf(group);
-      if (document.activeElement !== frequency) frequency!.value = group.frequency.toFixed(1);
-      if (ratio && document.activeElement !== ratio) ratio.value = group.ratio.toFixed(2);
+      frequency!.value = group.frequency.toFixed(1);
+      if (ratio) ratio.value = group.ratio.toFixed(2);
       const [[re, im]] = poles as [Complex];
       say(this.places[k]!, im ? `${signed(re, 2)} ± ${im.toFixed(2)} i` : poles.map(([a]) => signed(a, 2)).join(", "));
     });
@@ -154,7 +154,7 @@ export class Design {
     const rows: [string, string][] = [
       ["rigs that are stabilised", `${(100 * this.share!).toFixed(0)} %`],
       ["largest command", `${significant(most(2 * n, 0))} of ${significant(command.limit)} ${command.unit}`],
-      ["command noise from the encoders, rms", `${significant(power * rms)} ${small}`],
+      ["command noise, rms", `${significant(power * rms)} ${small}`],
       [`largest ${short(coordinates[0]!.meaning)} movement`, `${significant(arm.scale * most(0, point[0]!), 2)} ${arm.unit}`],
       ...coordinates.map(({ name }, i): [string, string] => [`gains on ${symbol(name)}, its rate`, `${significant(K[2 * i]!)}, ${significant(K[2 * i + 1]!)}`]),
       ["answered in", `${milliseconds.toFixed(0)} ms`],
@@ -171,9 +171,9 @@ export class Design {
     };
     const last = (k: number) => (rows[k]![2 * n - 2]! - DATA.point[n - 1]!) * shown.scale;
     const most = rows.reduce((m, _, k) => Math.max(m, Math.abs(last(k))), 0);
-    byId("predicted-title").replaceChildren("Predicted release ", make("span", { class: "unit" }, `${symbol(name)} from upright [${shown.unit}]; command [${DATA.command.unit}]`));
+    byId("predicted-title").replaceChildren("Predicted release ", make("span", { class: "unit" }, `${symbol(name)} [${shown.unit}], command [${DATA.command.unit}]`));
     one("predicted-last", `predicted ${short(meaning)}, two seconds`, `--q${(n - 1) % 4}`, last, about(most, 5, shown.unit));
-    one("predicted-command", "predicted command, two seconds", "--effort", (k) => rows[k]![2 * n]!, limited(DATA.command.limit));
+    one("predicted-command", "predicted command, two seconds", "--effort", (k) => rows[k]![2 * n]!, limited(DATA.command.limit, rows.reduce((m, row) => Math.max(m, Math.abs(row[2 * n]!)), 0)));
   }
 
   /** Whether the poles may be applied, and why not. */

@@ -37,12 +37,13 @@ export function polesOf(group: Group): Complex[] {
   return [[-z * w + apart, 0], [-z * w - apart, 0]];
 }
 
-/** The nearest group that may be asked for. */
+/** The nearest group that may be asked for: no pole is further from the origin than the fastest. */
 export function within(group: Group, fastest: number): Group {
   const between = (x: number, low: number, high: number) => Math.min(Math.max(x, low), high);
   let ratio = between(group.ratio, LEAST.ratio, MOST_RATIO);
   if (Math.abs(ratio - 1) < APART) ratio = ratio < 1 ? 1 - APART : 1 + APART;
-  return { ...group, ratio, frequency: between(group.frequency, LEAST.frequency, fastest) };
+  const spread = ratio > 1 && !group.single ? ratio + Math.sqrt(ratio * ratio - 1) : 1;
+  return { ...group, ratio, frequency: between(group.frequency, LEAST.frequency, fastest / spread) };
 }
 
 /** A group after its pole `which` (0, 1) is dragged to a place; off the real axis by more than `near` it is complex. */

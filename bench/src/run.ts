@@ -138,7 +138,7 @@ export class Run {
       const value = here(c), text = Number.isFinite(value) ? `${signed((value - zero) * scale, c < n ? 1 : 2)} ${unit}` : "–";
       say(reading, text);
       drawStrip(canvas, {
-        ...(c < n ? about(history.farthest(c, zero) * scale, least, unit) : limited(scene.command.limit)),
+        ...(c < n ? about(history.farthest(c, zero) * scale, least, unit) : limited(scene.command.limit, history.farthest(c, 0))),
         colour: c < n ? `--q${c % 4}` : "--effort", count: ticks, at: (k) => (history.ago(c, ticks - 1 - k) - zero) * scale,
         times: Array.from({ length: 6 }, (_, i) => (i === 5 ? "now" : `\u2212${seconds - (i * seconds) / 5} s`)),
       });

@@ -93,5 +93,6 @@ export function about(most: number, least: number, unit: string): { range: numbe
   return { range, tick: range };
 }
 
-/** Scale of a command with its limit. */
-export const limited = (limit: number): { range: number; tick: number; limit: number } => ({ range: 1.15 * limit, tick: limit, limit });
+/** Scale of a command with its limit; one that stays far below it is drawn larger. */
+export const limited = (limit: number, most: number): { range: number; tick: number; limit: number } =>
+  most > limit / 4 ? { range: 1.15 * limit, tick: limit, limit } : { ...about(most, limit / 50, ""), limit };

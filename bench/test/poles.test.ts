@@ -38,6 +38,7 @@ test("no pole can be dragged into the unstable half, and none beyond the fastest
     expect(poles.every(([re]) => re < 0)).toBe(true);
     expect(Math.hypot(...poles[0]!)).toBeLessThan(25 + 1e-9);
   }
+  expect(polesOf(within(ofReal(3, 400), 25)).every(([re]) => re >= -25 - 1e-9)).toBe(true);
 });
 
 test("the roots of the characteristic polynomial are the poles of a companion matrix", () => {

@@ -6,7 +6,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
@@ -25,15 +25,16 @@ PATIENCE = 90_000  # ms; the rig's kernel is compiled at the first request, on a
 class Server:
     """`upright bench` as its user starts it, with its twin of the Furuta pendulum."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, fifo: bool = False) -> None:
         if not files("upright.browser").joinpath("page/index.html").is_file():
             pytest.skip("the page is not built: npm --prefix bench install && npm --prefix bench run build")
-        self.folder, self.port = folder, 0
+        self.folder, self.port, self.fifo = folder, 0, fifo
         self.open()
 
     def open(self) -> None:
         """Start it, at the port that it had before."""
-        command = [sys.executable, "-m", "upright", "bench", "--no-browser", "--no-fifo", "-o", str(self.folder)]
+        command = [sys.executable, "-m", "upright", "bench", "--no-browser", "-o", str(self.folder)]
+        command += [] if self.fifo else ["--no-fifo"]
         self.process = subprocess.Popen([*command, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         for line in self.process.stdout:
@@ -115,10 +116,14 @@ def browser() -> Iterator[Any]:
 
 
 @contextmanager
-def student(opened: Any, server: Server, *, screen: str = "run", dark: bool = False, **kind: Any) -> Iterator[Student]:
-    """Somebody who opens the page."""
+def student(
+    opened: Any, server: Server, *, screen: str = "run", dark: bool = False,
+    prepare: Callable[[Any], Any] = lambda _: None, **kind: Any,
+) -> Iterator[Student]:  # fmt: skip
+    """Somebody who opens the page, once it is prepared."""
     context = opened.new_context(color_scheme="dark" if dark else "light", **(kind or DESK))
     someone = Student(context.new_page())
+    prepare(someone.page)
     someone.page.goto(f"{server.url}#/furuta/{screen}")
     someone.page.wait_for_selector("#state:not([data-state=lost])")
     yield someone

@@ -1,0 +1,45 @@
+"""Pictures of the bench for the documentation: `python -m tests.browser.pictures docs/images`."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.browser.students import PHONE, Server, browser, student
+
+NAMES = ("bench_run", "bench_design", "bench_phone")
+
+
+def take(folder: Path, server: Server) -> None:
+    """Run, Design in the dark, and a phone that watches, each of a run that goes on."""
+    with browser() as chromium, student(chromium, server) as one:
+        one.page.wait_for_selector("#drawing polyline", state="attached")
+        one.starts()
+        for _ in range(2):
+            one.page.wait_for_timeout(2500)
+            one.page.click("#tap")
+        one.page.wait_for_timeout(1500)
+        one.page.mouse.move(0, 300)
+        one.page.screenshot(path=folder / "bench_run.png")
+        with student(chromium, server, **{**PHONE, "device_scale_factor": 1}) as phone:
+            phone.page.wait_for_timeout(5000)
+            phone.page.screenshot(path=folder / "bench_phone.png")
+        one.page.emulate_media(color_scheme="dark")
+        one.page.click("#tab-design")
+        one.reads("#share", "rigs are stabilised")
+        pairs = one.page.locator("#pairs input")
+        for k, value in enumerate(("8", "0.7", "12", "1.3")):
+            pairs.nth(k).fill(value)
+            pairs.nth(k).press("Enter")
+        one.page.locator(".pole[role=slider]").first.focus()
+        one.page.wait_for_timeout(3000)
+        one.page.screenshot(path=folder / "bench_design.png")
+        one.leaves()
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as runs:
+        opened = Server(Path(runs), fifo=True)
+        take(Path(sys.argv[1]), opened)
+        opened.close()
