@@ -25,12 +25,13 @@ async function rigs(): Promise<Listed[]> {
   }
 }
 
-/** Whether the rig's drawing and kernel are here: a rig whose law is none of state feedback has none. */
-function known(rig: string): Promise<boolean> {
+/** Loads the rig's drawing and kernel; why it has none, or "". */
+function unknown(rig: string): Promise<string> {
+  const src = `/rigs/${encodeURIComponent(rig)}/twin.js`;
   return new Promise((resolve) => {
-    const script = make("script", { src: `/rigs/${encodeURIComponent(rig)}/twin.js` });
-    script.onload = () => resolve(typeof DATA !== "undefined");
-    script.onerror = () => resolve(false);
+    const script = make("script", { src });
+    script.onload = () => resolve("");
+    script.onerror = () => void fetch(src).then((answer) => answer.text(), () => "").then((why) => resolve(why || "there is no drawing"));
     document.head.append(script);
   });
 }
@@ -95,9 +96,9 @@ async function bench(): Promise<void> {
   addEventListener("hashchange", () => (place()[0] === name ? show(place()[1]) : location.reload()));
   const wanted = place()[1];
   show(wanted);
-  void known(name).then((is) => {
-    moving = is;
-    run.note = moving ? "" : "it has no drawing: its law is no feedback of states";
+  void unknown(name).then((why) => {
+    moving = why === "";
+    run.note = why;
     byId("tab-design").hidden = !moving;
     scene();
     if (wanted === "design" && !byId("run").hidden) show(wanted);

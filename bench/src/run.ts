@@ -115,7 +115,7 @@ export class Run {
     if (kind === "TWIN") this.speed = add("tap", `${last.unit}/s`, TAP, [-20, 20, 0.1]);
     if (follows) {
       const driven = coordinates[moved]!, { unit, scale } = shownUnit(driven.unit), most = Math.min(travel ?? Infinity, FARTHEST) * scale;
-      add(`reference of the ${short(driven.meaning)}`, unit, 0, [-most, most, 1], (value) => this.session.steer({ do: "reference", value: value / scale }));
+      add(`reference, ${short(driven.meaning)}`, unit, 0, [-most, most, 1], (value) => this.session.steer({ do: "reference", value: value / scale }));
     }
     this.reason = basis.level === "not trusted" ? make("input", { type: "text", maxlength: "200", value: this.reason?.value ?? "" }) : undefined;
     if (this.reason) rows.push(make("label", { class: "field" }, make("span", {}, "The model is not trusted. Reason to run it all the same"), this.reason));
@@ -131,7 +131,7 @@ export class Run {
     this.idle = 0;
     const n = channels.length - 1, here = (c: number) => history.ago(c, 0), ticks = history.ticks;
     byId("drawing").classList.toggle("tappable", this.tappable);
-    say(byId("rig-note"), this.tappable ? "touch it beside the pendulum to tap it" : this.note);
+    say(byId("rig-note"), this.tappable && this.rig ? `touch it left or right to tap the ${short(scene.coordinates.at(-1)!.meaning)}` : this.note);
     const q = scene.zero.map((zero, i) => zero + (Number.isFinite(here(i)) ? here(i) : 0));
     this.rig?.draw(q);
     channels.forEach(({ canvas, reading, unit, scale, zero, least }, c) => {

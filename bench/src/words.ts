@@ -3,7 +3,10 @@
 export const DEGREE = 180 / Math.PI;
 const GREEK: Record<string, string> = { theta: "θ", psi: "ψ", alpha: "α", phi: "φ", beta: "β", gamma: "γ" };
 
-export const symbol = (name: string): string => GREEK[name] ?? name.replace("_", "");
+export function symbol(name: string): string {
+  const [base = "", index = ""] = name.split("_");
+  return (GREEK[base] ?? base) + index.replace(/\d/g, (digit) => String.fromCharCode(0x2080 + Number(digit)));
+}
 
 /** With a true minus, and no minus before nothing. */
 export function signed(value: number, digits: number): string {
@@ -33,5 +36,5 @@ export function rangeFor(value: number, least: number, unit: string): number {
 /** Bare name of what a coordinate measures: "arm" of "angle of the arm, positive counterclockwise". */
 export function short(meaning: string): string {
   const first = meaning.split(/[,;(]/)[0]!.trim();
-  return first.includes(" of the ") ? first.split(" of the ").at(-1)! : first;
+  return first.split(/ of (?:the )?/).at(-1)!;
 }

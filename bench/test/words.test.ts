@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { rangeFor, short, signed, significant } from "../src/words";
+import { rangeFor, short, signed, significant, symbol } from "../src/words";
 
 test("nothing has no sign, and a minus is a minus", () => {
   expect(signed(-0.04, 1)).toBe("0.0");
@@ -17,5 +17,7 @@ test("a range holds its value, in steps of 1-2-5, and angles go on in half turns
 
 test("a coordinate is named by what it measures", () => {
   expect(short("angle of the pendulum, 0 hanging")).toBe("pendulum");
+  expect(short("position of cart 1")).toBe("cart 1");
   expect(short("position")).toBe("position");
+  expect(["theta", "theta_1", "x_2", "x"].map(symbol)).toEqual(["θ", "θ₁", "x₂", "x"]);
 });
