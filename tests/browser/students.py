@@ -23,18 +23,18 @@ PATIENCE = 90_000  # ms; the rig's kernel is compiled at the first request, on a
 
 
 class Server:
-    """`upright bench` as its user starts it, with its twin of the Furuta pendulum."""
+    """`upright bench` as its user starts it, with rigs or with its twin of the Furuta pendulum."""
 
-    def __init__(self, folder: Path, *, fifo: bool = False) -> None:
+    def __init__(self, folder: Path, *rigs: Path, fifo: bool = False) -> None:
         if not files("upright.browser").joinpath("page/index.html").is_file():
             pytest.skip("the page is not built: npm --prefix bench install && npm --prefix bench run build")
-        self.folder, self.port, self.fifo = folder, 0, fifo
+        self.folder, self.rigs, self.port, self.fifo = folder, rigs, 0, fifo
         self.open()
 
     def open(self) -> None:
         """Start it, at the port that it had before."""
-        command = [sys.executable, "-m", "upright", "bench", "--no-browser", "-o", str(self.folder)]
-        command += [] if self.fifo else ["--no-fifo"]
+        command = [sys.executable, "-m", "upright", "bench", *map(str, self.rigs), "--no-browser"]
+        command += ["-o", str(self.folder), *([] if self.fifo else ["--no-fifo"])]
         self.process = subprocess.Popen([*command, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         for line in self.process.stdout:

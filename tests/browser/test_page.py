@@ -248,8 +248,7 @@ def test_a_whole_session_by_touch(server, chromium):
         page.tap("#start")
         one.sees("running")
         one.reads("#rig-note", "touch it")
-        for _ in range(3):  # a finger beside the pendulum taps it
-            page.touchscreen.tap(40, 300)
+        page.touchscreen.tap(40, 300)  # a finger beside the pendulum taps it; three would throw it over
         page.tap("#tab-design")
         one.reads("#share", "rigs are stabilised")
         box = page.locator(".pole[role=slider]").first.bounding_box()
@@ -267,6 +266,24 @@ def test_a_whole_session_by_touch(server, chromium):
         one.sees("stopped")
         one.leaves()
         assert one.wrong == []
+
+
+def test_of_several_rigs_each_has_its_page_and_one_without_a_drawing_says_why(chromium, tmp_path):
+    for name, make in (("cart", "linear"), ("disks", "torsional")):
+        at = "" if make == "linear" else 'at = "rest"\n'
+        (tmp_path / f"{name}.toml").write_text(f'kind = "twin"\nname = "{name}"\nmake = "{make}"\n{at}', "utf-8")
+    several = Server(tmp_path / "runs", tmp_path / "cart.toml", tmp_path / "disks.toml")
+    with student(chromium, several) as one:
+        one.reads("#rig-name", "cart")
+        one.reads("#strips", r"cart \[cm\]")
+        one.page.click("#rigs a:has-text('disks')")
+        one.reads("#rig-name", "disks")
+        one.reads("#rig-note", "needs a rig with one drive and an inverted equilibrium")
+        assert not one.page.locator("#tab-design").is_visible()
+        one.starts()
+        one.reads("#readings", "deg")
+        one.leaves()
+    several.close()
 
 
 def test_all_samples_of_1_kHz_take_less_than_15_kB_a_second(server, chromium):
