@@ -139,6 +139,20 @@ def measured_response_page(folder: Path) -> Chapter:
     return log_chapter(LoggedResponse(sources=("sines.csv",), response=response, answer=None, folder=folder))
 
 
+def run_page(folder: Path) -> Chapter:
+    from tests.report.test_run import log
+    from upright.logs.whole import RunEvent
+    from upright.report.run import chapter
+
+    return chapter(log(complaint="It ends at byte 5.", events=[RunEvent(t=10.5, kind="stop", text="asked", row=3)]))
+
+
+def compare_page(folder: Path) -> Chapter:
+    from tests.report.fit.test_compare import compared, told
+
+    return told(compared())
+
+
 class Rising:
     """Takes progress that never goes back and never says more than all; a fit's own starts may begin anew."""
 

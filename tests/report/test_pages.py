@@ -14,6 +14,7 @@ from rich.console import Console
 from tests.pictures import unreadable
 from tests.report.pages import (
     blocks,
+    compare_page,
     design_page,
     doctor_page,
     fit_page,
@@ -28,6 +29,7 @@ from tests.report.pages import (
     own_frequency_page,
     paper_page,
     regulation_page,
+    run_page,
     short_ladder_page,
     squeezed,
     survey_page,
@@ -47,6 +49,8 @@ QUICK = {
     "law": law_page,
     "ladder": short_ladder_page,
     "measured response": measured_response_page,
+    "run": run_page,
+    "compare": compare_page,
     "survey of people": survey_page("synthetic_wide.csv"),
     "survey of means": survey_page("table_4.csv", 53),
     "survey of shares": survey_page("table_3.csv", 53),
