@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 BLACK_BOX = "black box"
 """Name of the baseline among those that predict."""
+_COLUMNS = 5  # of a legend
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,7 +238,8 @@ def compared_figure(scores: Mapping[str, RunScore], plant: type[Plant], *, title
     units = {c.name: c.unit for c in plant.coordinates}
     first = next(iter(scores.values()))
     n = len(first.measured)
-    drawing = figure(0.9 + 2.6 * n, margins=(0.85, 0.1, 0.5, 0.46))
+    named = 0.26 * math.ceil((1 + len(scores)) / _COLUMNS)  # inches of the legend, below the time
+    drawing = figure(0.64 + 2.6 * n + named, margins=(0.85, 0.1, 0.5, 0.46 + named))
     grid = drawing.add_gridspec(2 * n, 1, height_ratios=[2.4, 1] * n, hspace=0.3)
     panels: list[Axes] = []
     for j, signal in enumerate(first.measured):
@@ -258,7 +261,9 @@ def compared_figure(scores: Mapping[str, RunScore], plant: type[Plant], *, title
         lower.set_ylim(-reach, reach)
     panels[0].set_title(title, parse_math=False)
     hide_inner_times(panels)
-    drawing.legend(*panels[0].get_legend_handles_labels(), loc="lower left", bbox_to_anchor=(0.85 / WIDTH, 0), ncols=5)
+    drawing.legend(
+        *panels[0].get_legend_handles_labels(), loc="lower left", bbox_to_anchor=(0.85 / WIDTH, 0), ncols=_COLUMNS
+    )
     return drawing
 
 
