@@ -56,6 +56,16 @@ def test_intervals_hold_the_truth_that_the_force_has_moved_the_estimates_from(pu
         assert low <= FURUTA[name] <= high, name
 
 
+def test_no_interval_leaves_the_bounds_of_its_number_because_of_the_force() -> None:
+    """A gain does not grow with the command, whatever a force that the model lacks would have it do."""
+    droop = Parameter(name="actuator.droop", value=0.5, unit="1/(N m)", estimate=True, lower=0.0)
+    asked = rig(Furuta, FURUTA, GUESSES)
+    fit = identify(replace(asked, parameters={**asked.parameters, droop.name: droop}), [driven("one", "fit", LEAN)])
+    assert any("constant force" in w for w in fit.warnings)
+    low, high = fit.estimates[droop.name].interval
+    assert low == 0.0 < high
+
+
 def test_bands_hold_what_the_force_does_to_another_run(pulled) -> None:
     assert pulled.bands.names[-1] == OFFSET
     assert min(pulled.runs["two"].inside.values()) > 85
