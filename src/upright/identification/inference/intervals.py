@@ -75,7 +75,7 @@ def shared_estimates(
                 wide = replace(plain, interval=interval).half > WIDE
             status = "at bound" if best.pinned[i] else "poorly determined" if wide else firm
         status = "nuisance" if u.name.startswith(NOISE) else status
-        estimates[u.name] = replace(plain, interval=within(u, interval), status=status)
+        estimates[u.name] = replace(plain, interval=within_bounds(u, interval), status=status)
     return estimates
 
 
@@ -130,7 +130,7 @@ def beside_bound(best: Optimum, place: int, quantile: float | None = None) -> Es
     return replace(plain, interval=(math.exp(max(low, -700.0)), math.exp(min(high, 700.0))) if u.log else (low, high))
 
 
-def within(u: Unknown, interval: tuple[float, float]) -> tuple[float, float]:
+def within_bounds(u: Unknown, interval: tuple[float, float]) -> tuple[float, float]:
     """An interval without what lies beyond the bounds of its number."""
     return max(interval[0], u.lower), min(interval[1], u.upper)
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.inference.covariance import Optimum, assess
-from upright.identification.inference.intervals import Intervals, beside_bound, estimate, within
+from upright.identification.inference.intervals import Intervals, beside_bound, estimate, within_bounds
 from upright.identification.inference.scoring import score_run
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate
@@ -169,7 +169,8 @@ def _shown(best: Optimum, parameter: Parameter, means: str, left: float) -> Negl
     return Neglected(
         name=name, size=size, means=means, essential=left < 1,
         intervals={
-            problem.unknowns[i].name: within(problem.unknowns[i], beside_bound(there, i).interval) for i in shared
+            problem.unknowns[i].name: within_bounds(problem.unknowns[i], beside_bound(there, i).interval)
+            for i in shared
         },
         names=tuple(problem.unknowns[i].name for i in shared),
         moves=(there.values[:-1] - best.values)[shared],
