@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import random
+import time
 import urllib.error
 import urllib.request
 from contextlib import contextmanager, suppress
@@ -17,6 +18,7 @@ from tests.browser.runs import RUNNING, SOON, ByHand, felt, settled, station, tw
 from tests.browser.test_frames import decoded
 from upright.browser.guard import COOKIE
 from upright.browser.hub import Hub
+from upright.browser.lease import PATIENCE
 from upright.browser.outbox import FRAMES
 from upright.browser.serve import Bench, open_bench
 from upright.errors import BadInput
@@ -68,7 +70,8 @@ class Client:
 
     def note(self, kind, **wanted):
         """The next note of a kind with these values."""
-        while True:
+        until = time.monotonic() + SOON
+        while time.monotonic() < until:
             content = self.socket.recv(timeout=SOON)
             if isinstance(content, bytes):
                 self.frames.append(content)
@@ -76,6 +79,7 @@ class Client:
             note = json.loads(content)
             if note["type"] == kind and wanted.items() <= note.items():
                 return note
+        raise AssertionError(f"no {kind} with {wanted} came")
 
     def samples(self, last):
         """Tick and counts of every sample that came, once that of a tick is there."""
@@ -285,6 +289,34 @@ def test_who_takes_nothing_holds_nobody_up(rig, tmp_path):
 
     with station(rig, tmp_path) as (made, carry, _):
         asyncio.run(scenario(made, carry))
+
+
+def test_an_operator_is_missed_when_the_last_of_their_connections_ends(rig, tmp_path):
+    """As after a reload, when the old connection ends behind the new one."""
+
+    async def scenario(made, carry, clock):
+        hub = Hub(made)
+        who, old = hub.join("")
+        made.lease.give("operator")
+        made.lease.take(who)
+        made.start(who)
+        carry.go()
+        same, new = hub.join(who)
+        assert same == who
+        hub.leave(old)
+        clock.now += 2 * PATIENCE
+        hub.turn()
+        assert made.state == "running"
+        hub.leave(new)
+        clock.now += PATIENCE
+        hub.turn()
+        assert made.state == "running"
+        clock.now += 0.1
+        hub.turn()
+        assert made.state == "stopped"
+
+    with station(rig, tmp_path) as (made, carry, clock):
+        asyncio.run(scenario(made, carry, clock))
 
 
 def test_a_network_needs_the_token(rig, tmp_path):
