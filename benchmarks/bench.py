@@ -77,7 +77,7 @@ def _taken(station: Any, pipe: Connection) -> list[int]:
     while not pipe.poll():
         if station.desk is not None and (last := station.desk.taken) and last not in out[-1:]:
             out.append(last)
-        pause.wait(0.01)
+        pause.wait(0.002)
     return out
 
 
