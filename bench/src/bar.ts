@@ -61,6 +61,10 @@ export class Bar {
     say(byId("state"), phase ? WORD[phase] : "Not connected");
     say(byId("late"), `${state?.late ?? 0}`);
     lock(byId("start"), unsteerable || (ended ? "" : phase === "stopped" ? "The rig is stopped; rearm it first." : "The rig runs already."));
+    const from = byId<HTMLSelectElement>("from");
+    from.hidden = state?.hanging !== "";
+    from.disabled = phase === "starting" || phase === "running";
+    if (from.disabled && state) from.value = state.from;
     for (const id of ["end", "tap"]) lock(byId(id), unsteerable || (phase === "running" ? "" : "The rig does not run; start it first."));
     lock(byId("rearm"), unsteerable);
     const operator = state?.operator ?? "nobody";

@@ -182,7 +182,8 @@ export class Design {
     if (!scene || this.share === undefined) return;
     const few = this.share < ENOUGH, { level, sentence } = scene.basis;
     const idle = this.session.state?.state !== "running" ? "Start the rig to apply: gains are changed while it runs." : "";
-    const why = unsteerable || idle || (few ? "Apply is locked: fewer than 95 % of the rigs are stabilised. Slow the fast poles down, or give them more damping." : "");
+    const swing = this.session.state?.from === "hanging" ? "A swing-up runs, whose poles stay as they are. Start held upright to change them." : "";
+    const why = unsteerable || idle || swing || (few ? "Apply is locked: fewer than 95 % of the rigs are stabilised. Slow the fast poles down, or give them more damping." : "");
     badge.className = `badge ${few || level === "not trusted" ? "no" : level === "trusted" ? "ok" : "care"}`;
     say(badge, few ? "not supported" : level);
     say(byId("gate"), why || (this.confirming ? "This moves a real rig. Stand clear, one hand at its switch." : sentence || "At least 95 % of the rigs are stabilised."));

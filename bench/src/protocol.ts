@@ -40,6 +40,10 @@ export interface State {
   late: number;
   faults: string[];
   verdict: string;
+  /** Why it cannot be swung up from where it hangs; "" where it can. */
+  hanging: string;
+  /** Where the run, or the last one, began. */
+  from: "held" | "hanging";
 }
 
 export type ServerMessage =
@@ -50,7 +54,7 @@ export type ServerMessage =
 
 export type ClientRequest =
   | { do: "operate" | "release" | "stop" | "end" | "rearm" }
-  | { do: "start"; seconds?: number; start?: number[]; accept?: string }
+  | { do: "start"; seconds?: number; start?: number[]; from?: State["from"]; accept?: string }
   | { do: "tap"; coordinate: string; speed: number }
   | { do: "poles"; poles: Complex[]; confirm?: boolean }
   | { do: "reference"; value: number };

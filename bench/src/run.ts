@@ -10,6 +10,7 @@ import { short, shownUnit, signed, significant, symbol } from "./words";
 const SATURATED = 1 - 1e-3, LAMP = 0.5; // part of the limit; seconds for which the lamp stays on
 const TILT = 3, ASIDE = 0.3, TAP = 0.8, LONGEST = 3600; // deg, cm, rad/s or m/s, s
 const IDLE = 15; // frames
+const FAR = Math.PI + 0.5; // from what is held, from where on another turn of it is nearer; hanging is near to two [rad]
 const FARTHEST = Math.PI; // reference where the travel has no end [rad or m]
 
 interface Channel {
@@ -19,6 +20,8 @@ interface Channel {
   scale: number;
   zero: number;
   least: number;
+  /** Turns by which what is shown is held elsewhere: a pendulum that was swung up may stand one turn on. */
+  turns: number;
 }
 
 export class Run {
@@ -47,10 +50,11 @@ export class Run {
   }
 
   start(): void {
-    const { tilt, seconds, session } = this;
+    const { tilt, seconds, session } = this, begin = byId<HTMLSelectElement>("from");
+    const from = !begin.hidden && begin.value === "hanging" ? "hanging" : "held";
     const away = tilt && DATA.away.map(() => 0);
     if (away) away[away.length - 2] = tilt.valueAsNumber / shownUnit(DATA.coordinates.at(-1)!.unit).scale;
-    session.steer({ do: "start", ...(away ? { start: away } : {}), ...(seconds ? { seconds: seconds.valueAsNumber } : {}), ...(this.reason?.value ? { accept: this.reason.value } : {}) });
+    session.steer({ do: "start", ...(from === "hanging" ? { from } : away ? { start: away } : {}), ...(seconds ? { seconds: seconds.valueAsNumber } : {}), ...(this.reason?.value ? { accept: this.reason.value } : {}) });
   }
 
   tap(side = 1): void {
@@ -75,7 +79,7 @@ export class Run {
       const reading = make("dd", { class: colour }, "–");
       byId("readings").append(make("div", {}, make("dt", {}, upright ? "from upright" : name), reading));
       const least = unit === "deg" ? 5 : 1;
-      return { canvas, reading, unit, scale, zero: coordinate ? scene.point[i]! : 0, least };
+      return { canvas, reading, unit, scale, zero: coordinate ? scene.point[i]! : 0, least, turns: upright ? 0 : NaN };
     });
     if (known && !this.rig) {
       const q = DATA.start.filter((_, i) => i % 2 === 0), view = RigDrawing.view(OUTLINE, [q, q.map(() => 0)]);
@@ -134,8 +138,10 @@ export class Run {
     say(byId("rig-note"), this.tappable && this.rig ? `touch it left or right to tap the ${short(scene.coordinates.at(-1)!.meaning)}` : this.note);
     const q = scene.zero.map((zero, i) => zero + (Number.isFinite(here(i)) ? here(i) : 0));
     this.rig?.draw(q);
-    channels.forEach(({ canvas, reading, unit, scale, zero, least }, c) => {
-      const value = here(c), text = Number.isFinite(value) ? `${signed((value - zero) * scale, c < n ? 1 : 2)} ${unit}` : "–";
+    channels.forEach((channel, c) => {
+      const { canvas, reading, unit, scale, least } = channel, value = here(c), away = value - channel.zero;
+      if (Math.abs(away - 2 * Math.PI * channel.turns) > FAR) channel.turns = Math.round(away / (2 * Math.PI));
+      const zero = channel.zero + 2 * Math.PI * (channel.turns || 0), text = Number.isFinite(value) ? `${signed((value - zero) * scale, c < n ? 1 : 2)} ${unit}` : "–";
       say(reading, text);
       drawStrip(canvas, {
         ...(c < n ? about(history.farthest(c, zero) * scale, least, unit) : limited(scene.command.limit, history.farthest(c, 0))),

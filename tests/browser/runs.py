@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -72,11 +73,19 @@ def hardware(rig, basis=None):
     return replace(rig, file=replace(rig.file, performed=""), basis=basis or rig.basis)
 
 
+def swung_up(rig, path):
+    """Stands for the design of a swing-up: the law that holds, in its place."""
+    path.write_bytes(rig.law_path.read_bytes())
+    return json.dumps(rig.loop.K[0].tolist())
+
+
 @contextmanager
 def station(rig, folder) -> Iterator[tuple[Station, ByHand, Clock]]:
     """A rig whose runs are performed by hand, with an operator."""
     carry, clock = ByHand(), Clock()
-    made = Station(rig, folder, carry=carry, report=lambda run, end, started: "the verdict", clock=clock)
+    made = Station(
+        rig, folder, carry=carry, report=lambda run, end, started: "the verdict", swing_up=swung_up, clock=clock
+    )
     made.lease.take("operator")
     yield made, carry, clock
     if not made.over:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import pytest
 
 from tests.browser.students import DESK, PHONE, Server, browser, student
+from tests.browser.test_frames import decoded
+from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
 
@@ -19,6 +22,11 @@ COVERS = """() => { const box = document.getElementById('stop').getBoundingClien
     box.left + inset + x * (box.width - 2 * inset), box.top + inset + y * (box.height - 2 * inset)))
     .filter((e) => !e?.closest('#stop')).map((e) => e?.outerHTML.slice(0, 100) ?? 'outside') }"""
 """What lies over a place of the button STOP."""
+
+STANDS = """most => { const text = document.querySelectorAll('#readings dd')[1].textContent;
+  return Math.abs(parseFloat(text.replace('\u2212', '-'))) < most * 180 / Math.PI }"""
+"""Whether the page says that the pendulum is so far from upright at most."""
+RIG = make_rig("furuta")
 
 
 @pytest.fixture(scope="module")
@@ -107,6 +115,36 @@ def test_a_whole_session_by_mouse_until_it_falls(server, chromium):
         page.click("#tab-run")
         page.click("#stop")
         one.sees("stopped")
+        one.leaves()
+        assert one.wrong == []
+
+
+def test_hanging_it_swings_up_and_stands_in_the_picture_as_in_the_frames(server, chromium):
+    theta, per_turn = [], RIG.per_unit[1] * math.tau
+    with student(chromium, server) as one:
+        page = one.page
+
+        def reading(frame):
+            if isinstance(frame, bytes):
+                theta.extend(counts[1] for counts in decoded(frame)[1])
+
+        page.on("websocket", lambda socket: socket.on("framereceived", reading))
+        page.reload()
+        page.wait_for_selector("#from:not([hidden])")
+        page.select_option("#from", "hanging")
+        one.starts()
+        page.wait_for_function(STANDS, arg=math.radians(10))
+        page.wait_for_timeout(3000)
+        one.reads("#readings", r"from upright.?-?\u2212?\d\.\d deg")
+        assert abs(theta[0]) < per_turn / 36
+        assert all(abs(abs(n) - per_turn / 2) < per_turn / 36 for n in theta[-500:])
+        page.click("#tab-design")
+        one.reads("#gate", "A swing-up runs")
+        page.click("#tab-run")
+        page.click("#end")
+        one.sees("ended")
+        one.reads("#message", "Stopped after")  # its report is written
+        page.select_option("#from", "held")
         one.leaves()
         assert one.wrong == []
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.browser.runs import felt, hardware, settled, station, twin
 from upright.basis import NOT_TRUSTED, Basis
+from upright.browser.hanging import write_swing_up
 from upright.browser.lease import PATIENCE
 from upright.browser.messages import ClientRequest
+from upright.browser.runs import listed, report_apart
 from upright.browser.station import obey
 from upright.errors import BadInput
-from upright.realtime.process import BY_HAND, DEAF
+from upright.realtime.process import BY_HAND, DEAF, run_in_process
 from upright.realtime.session import RunState
+from upright.running.run import RunRequest, prepared
 
 
 @pytest.fixture(scope="module")
@@ -259,3 +263,61 @@ def test_hardware_whose_model_is_not_trusted_runs_only_for_a_reason(rig, tmp_pat
         assert (made.state, carry.orders) == ("idle", [])
         ask(made, "operator", "start", accept="to see it fall")
         assert made.state == "starting"
+
+
+def test_a_swing_up_begins_where_the_rig_hangs_once_it_is_designed_and_keeps_its_gains(at_work):
+    made, carry, _ = at_work
+    with pytest.raises(BadInput, match="being designed"):
+        ask(made, "operator", "start", **{"from": "hanging"})
+    assert (made.state, carry.orders) == ("idle", [])
+    assert settled(made, lambda m: not m.hanging)  # whoever asks has it designed
+    with pytest.raises(BadInput, match="hand"):
+        ask(made, "operator", "start", **{"from": "hanging", "start": [0.0, 0.0, 0.05, 0.0]})
+    ask(made, "operator", "start", **{"from": "hanging"})
+    carry.go()
+    assert (made.state, made.described("operator")["from"]) == ("running", "hanging")
+    stage = carry.orders[0].make()
+    assert (stage.supervisor.duty.at, stage.supervisor.duty.lean) == ("inverted", math.inf)
+    assert made.gains == pytest.approx(made.rig.loop.K)
+    for do, fields, words in (("poles", {"poles": [-5.0, -6.0, -7.0, -8.0]}, "a swing-up runs"),
+                              ("reference", {"value": 0.1}, "follows no reference")):  # fmt: skip
+        with pytest.raises(BadInput, match=words):
+            ask(made, "operator", do, **fields)
+    carry.end()
+    assert settled(made, lambda m: m.over)
+    ask(made, "operator", "start")
+    carry.go()
+    assert made.described("operator")["from"] == "held"
+    ask(made, "operator", "poles", poles=[-5.0, -6.0, -7.0, -8.0])
+
+
+def test_a_rig_without_a_swing_up_says_why(rig, tmp_path):
+    with pytest.raises(BadInput, match="encoders are checked"):
+        write_swing_up(hardware(rig), tmp_path / "s.json")
+    upright = replace(rig, file=replace(rig.file, zero="inverted"))
+    with pytest.raises(BadInput, match="goes from inverted to inverted"):
+        write_swing_up(upright, tmp_path / "s.json")
+    assert not (tmp_path / "s.json").exists()
+    with station(rig, tmp_path) as (made, _, _):
+        made._swing_up = lambda rig, path: write_swing_up(upright, path)
+        made.prepare()
+        assert settled(made, lambda m: "inverted" in m.hanging)
+        with pytest.raises(BadInput, match="goes from inverted"):
+            ask(made, "operator", "start", **{"from": "hanging"})
+        assert made.state == "idle"
+
+
+@pytest.mark.slow
+def test_the_furuta_twin_stands_within_ten_degrees_after_six_seconds_from_hanging(rig, tmp_path):
+    """By its log, whose encoders begin at 0 and end half a turn on, on either side; its report says since when."""
+    write_swing_up(rig, tmp_path / "swing_up.json")
+    wish = RunRequest(rig=rig.rig_path, law=tmp_path / "swing_up.json", seconds=6.0, from_rest=True)
+    run = prepared(wish, tmp_path)
+    end = run_in_process(run.order, paced=False)
+    t, theta = (run.ended(end).log.columns[name] for name in ("t", "theta"))
+    assert abs(theta[0]) < math.radians(5)
+    off = np.abs(np.abs(theta) - math.pi) > math.radians(10)
+    assert not off[-1000:].any()
+    since = t[np.flatnonzero(off)[-1] + 1] - t[0]
+    assert f"It stands since {since:.3g} s." in report_apart(run, end, 0.0)
+    assert listed(tmp_path, "furuta")[0]["report"] == "/rigs/furuta/runs/run.html"

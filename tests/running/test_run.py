@@ -369,6 +369,32 @@ def test_the_rest_is_told_from_the_second_half_about_what_was_held_or_what_it_va
     assert "theta varied by 2.3 degrees (rms, second half)" in followed.verdict
 
 
+@pytest.mark.parametrize("turns", [-1, 0, 1])
+def test_a_swing_up_is_told_by_the_nearest_upright_and_by_when_it_stands(folder, tmp_path, turns):
+    """A pendulum that hangs for a second, and then stands a tenth of a radian off, on either side of where it hung."""
+    wish = RunRequest(rig=folder / "RIG.toml", excite="free", seconds=0.2, check=False)
+    done = run_rig(wish, tmp_path)
+    t = 0.01 * np.arange(400)
+    upright = (2 * turns + 1) * math.pi
+
+    def ended(theta):
+        columns = {"t": t, "psi": np.zeros(400), "theta": theta, "u_applied": np.zeros(400)}
+        return replace(
+            done, log=replace(done.log, columns=columns), end=replace(done.end, target=(0.0, math.pi)),
+            request=replace(wish, law=folder / "design.json", excite="", from_rest=True),
+        )  # fmt: skip
+
+    stood = ended(np.where(t < 2.995, 0.0, upright + 0.1))
+    assert (stood.stands, stood.unrest[-1], stood.sound) == (300, pytest.approx(0.1), True)
+    assert "Stabilised" in stood.verdict
+    assert "It stands since 3 s" in stood.verdict
+    for theta, words in ((np.zeros(400), "180 degrees off"), (np.where(t < 3.9, upright, upright + 0.5), "29 degrees")):
+        fallen = ended(theta)
+        assert not fallen.sound
+        assert fallen.verdict.startswith(f"Not swung up in 0.2 s, {done.end.ticks} ticks, none late; it is ")
+        assert words in fallen.verdict
+
+
 @pytest.mark.parametrize(
     ("how", "words"),
     [

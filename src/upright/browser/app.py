@@ -81,6 +81,8 @@ def application(stations: Sequence[Station]) -> Starlette:
             return Response(await asyncio.shield(scripts[name]), media_type=SCRIPT)
         except UprightError as error:
             return PlainTextResponse(str(error), status_code=404)
+        finally:  # somebody has opened the rig; one after the other, since processors are few
+            hubs[name].station.prepare()
 
     async def runs(request: Request) -> Response:
         hub = hubs.get(request.path_params["name"])

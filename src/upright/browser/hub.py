@@ -60,7 +60,7 @@ class Hub:
         self._answer()
         station = self.station
         now_so = (station.state, station.why, station.lease.holder, station.verdict, station.last.phase,
-                station.last.mode, station.last.faults)  # fmt: skip
+                station.last.mode, station.last.faults, station.hanging)  # fmt: skip
         now = time.monotonic()
         if now_so != self._shown or now - self._when >= SECOND:
             self._shown, self._when = now_so, now
@@ -112,8 +112,8 @@ class Hub:
             outbox.note(self._scene_of(who))
 
     def _described(self) -> str:
-        rig, loop = self.station.rig, self.station.loop
-        changed = {} if loop is None else {"poles": rig.poles(loop.K), "K": loop.K[0].tolist()}
+        rig, K = self.station.rig, self.station.gains
+        changed = {} if K is None else {"poles": rig.poles(K), "K": K[0].tolist()}
         return json.dumps({**rig.scene, **changed})
 
     def _scene_of(self, who: str) -> str:

@@ -10,6 +10,8 @@ from typing import Any, NoReturn
 
 from upright.errors import BadInput, nearest
 
+HELD, HANGING = "held", "hanging"
+"""Where a run begins."""
 LONGEST = 4096
 """Bytes of a message at most."""
 _STATES = 16
@@ -41,6 +43,12 @@ def _text(value: Any) -> str:
     return value
 
 
+def _where(value: Any) -> str:
+    if value not in (HELD, HANGING):
+        raise ValueError(f"'{HELD}' or '{HANGING}'")
+    return str(value)
+
+
 def _list(value: Any) -> list[Any]:
     if not isinstance(value, list) or len(value) > _STATES:  # type: ignore[reportUnknownArgumentType]
         raise ValueError(f"a list of at most {_STATES}")
@@ -61,7 +69,12 @@ def _poles(value: Any) -> list[complex]:
 TABLE: Mapping[str, Mapping[str, tuple[Callable[[Any], Any], bool]]] = {
     "operate": {},
     "release": {},
-    "start": {"seconds": (_number, False), "start": (_numbers, False), "accept": (_text, False)},
+    "start": {
+        "seconds": (_number, False),
+        "start": (_numbers, False),
+        "accept": (_text, False),
+        "from": (_where, False),
+    },
     "stop": {},
     "end": {},
     "rearm": {},

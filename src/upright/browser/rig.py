@@ -142,7 +142,7 @@ def known_rig(path: Path, law: Path | None, folder: Path) -> BenchRig:
     model, _ = model_and_truth(file)
     name = re.sub(r"[^a-z0-9]+", "-", (file.name or _name(path)).lower()).strip("-")[:40] or "rig"
     draft = BenchRig(
-        name=name, rig_path=path, law_path=law or folder / name / "law.json", file=file, model=model, law=_NO_LAW,
+        name=name, rig_path=path, law_path=law or folder / name / "law.json", file=file, model=model, law=NO_LAW,
         basis=model.basis, loop=None, follows=False,
     )  # fmt: skip
     if law is not None:
@@ -159,7 +159,7 @@ def known_rig(path: Path, law: Path | None, folder: Path) -> BenchRig:
     return replace(draft, law=loop.law, loop=loop, follows=bool(np.any(loop.law.D[:, loop.law.readings :])))
 
 
-_NO_LAW = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.zeros((1, 1)))
+NO_LAW = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.zeros((1, 1)))
 
 
 def _name(path: Path) -> str:

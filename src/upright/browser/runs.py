@@ -7,10 +7,12 @@ import multiprocessing
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from upright.browser.rig import NO_LAW
 from upright.errors import UprightError
 from upright.files import replace_file
 from upright.realtime.session import RunEnd
@@ -34,7 +36,8 @@ def write_report(run: PreparedRun, end: RunEnd, started: float) -> str:
 
 def report_apart(run: PreparedRun, end: RunEnd, started: float) -> str:
     """The same in a process of its own."""
-    return in_own_process(write_report, run, end, started)
+    # the law of a swing-up is a function that no other process knows by its name, and a report has no use for it
+    return in_own_process(write_report, replace(run, law=NO_LAW), end, started)
 
 
 def listed(folder: Path, name: str) -> list[dict[str, Any]]:

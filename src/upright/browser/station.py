@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 import time
@@ -10,9 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from upright.basis import NOT_TRUSTED
+from upright.browser.hanging import swing_up_apart
 from upright.browser.lease import Lease
-from upright.browser.messages import ClientRequest
+from upright.browser.messages import HANGING, HELD, ClientRequest
 from upright.browser.rig import HARDWARE, TWIN, BenchRig
 from upright.browser.runs import report_apart
 from upright.errors import BadInput, UprightError, nearest
@@ -20,6 +24,7 @@ from upright.live.twin import Loop
 from upright.realtime.desk import Desk
 from upright.realtime.process import BY_HAND, DEAF, run_in_process
 from upright.realtime.session import RunEnd, RunState
+from upright.records import Array
 from upright.rigs.board import SENTENCES
 from upright.running.rig import NEAR
 from upright.running.run import PreparedRun, RunRequest, prepared
@@ -29,6 +34,7 @@ LONGEST, USUAL = 3600.0, 600.0
 """Of a run [s]."""
 TILT, ASIDE = math.radians(3.0), 0.003
 """How far a twin's hand lets go from what is held, where nobody says [rad, m]."""
+NOT_DESIGNED = "Its swing-up is being designed, which takes some seconds."
 FASTEST = 20.0
 """Tap that a twin's hand gives at most [rad/s or m/s]."""
 
@@ -38,8 +44,8 @@ class Station:
 
     Parameters
     ----------
-    carry, report : callable
-        Run an order as `run_in_process` does; write what it came to, and give the verdict.
+    carry, report, swing_up : callable
+        Run an order as `run_in_process` does; write what it came to, and give the verdict; store a swing-up.
     clock : callable
         Time that never goes back [s].
 
@@ -53,8 +59,12 @@ class Station:
         How the run goes, some twenty times a second.
     over : bool
         Whether no process has the rig.
+    hanging : str
+        Why it cannot be swung up from where it hangs, as a sentence; empty where it can.
+    from_hanging : bool
+        Whether the run, or the last one, began there.
     loop, requested : Loop or None
-        The law that runs as state feedback, and the one that was asked for last.
+        The law that runs as state feedback, and the one that was asked for last; a swing-up is none.
     desk : Desk or None
         Of the run that goes on, or of the last one.
     """
@@ -66,12 +76,16 @@ class Station:
 
     def __init__(
         self, rig: BenchRig, folder: Path, *, fifo: bool = True, carry: Callable[..., RunEnd] = run_in_process,
-        report: Callable[[PreparedRun, RunEnd, float], str] = report_apart, clock: Callable[[], float] = time.monotonic,
+        report: Callable[[PreparedRun, RunEnd, float], str] = report_apart,
+        swing_up: Callable[[BenchRig, Path], str] = swing_up_apart, clock: Callable[[], float] = time.monotonic,
     ) -> None:  # fmt: skip
         self.rig, self.folder, self.lease = rig, folder, Lease(clock)
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
         self.last, self.over, self.desk = RunState(phase=""), True, None
         self.loop, self.requested = rig.loop, None
+        self.hanging, self.from_hanging, self._swing_up = NOT_DESIGNED, False, swing_up
+        self._held_by: Array | None = None
+        self._designer: threading.Thread | None = None
         self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
@@ -82,8 +96,17 @@ class Station:
         if self.lease.lapsed() and self.state in (STARTING, RUNNING):
             self.stop("The operator is gone.")
 
-    def start(self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "") -> None:
-        """Begin a run.
+    def prepare(self) -> None:
+        """Have its swing-up designed, once, beside everything else."""
+        with self._lock:
+            if self._designer is None:
+                self._designer = threading.Thread(target=self._design, name=f"{self.rig.name} designer", daemon=True)
+                self._designer.start()
+
+    def start(
+        self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "", hanging: bool = False
+    ) -> None:
+        """Begin a run; where it is held, or from where it hangs.
 
         Raises
         ------
@@ -99,11 +122,18 @@ class Station:
             raise BadInput(f"a run takes more than 0 and at most {LONGEST:g} s, got {seconds:g} s.")
         if self.rig.kind == HARDWARE and self.rig.basis.level == NOT_TRUSTED and not accept.strip():
             raise BadInput(f"its model is not trusted: {self.rig.basis.sentence} Say why it runs all the same.")
+        if hanging and start:
+            raise BadInput("nobody's hand brings it away from where it hangs.")
+        if hanging and (why := self.hanging):
+            self.prepare()
+            raise BadInput(why)
         request = RunRequest(
-            rig=self.rig.rig_path, law=self.rig.law_path, seconds=seconds, tilt=self._tilt(start), accept=accept
-        )
+            rig=self.rig.rig_path, law=self._swing_path if hanging else self.rig.law_path, seconds=seconds,
+            tilt=0.0 if hanging else self._tilt(start), from_rest=hanging, accept=accept,
+        )  # fmt: skip
         self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
-        self.last, self.desk, self.loop = RunState(phase="starting"), Desk(), self.rig.loop
+        self.from_hanging = hanging  # before the desk, by which a new scene is made
+        self.last, self.desk, self.loop = RunState(phase="starting"), Desk(), None if hanging else self.rig.loop
         self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
         self._thread = threading.Thread(target=self._run, args=(request, self.desk), name=self.rig.name, daemon=True)
@@ -163,7 +193,10 @@ class Station:
             raise BadInput("this changes what drives a rig that can really move; confirm it.")
         if self.rig.basis.level == NOT_TRUSTED and not self._accepted:
             raise BadInput(f"its model is not trusted: {self.rig.basis.sentence}")
-        desk, loop = self._running(), self.rig.with_poles(poles)
+        desk = self._running()
+        if self.from_hanging:
+            raise BadInput("a swing-up runs, which is no feedback of states alone; its poles stay as they are.")
+        loop = self.rig.with_poles(poles)
         if not desk.change(loop.law):
             raise BadInput("the last change is not answered yet.")
         self.requested = loop
@@ -171,7 +204,7 @@ class Station:
     def follow(self, who: str, value: float) -> None:
         """Give the law another reference."""
         self._operated(who)
-        if not self.rig.follows:
+        if not self.rig.follows or (self.from_hanging and not self.over):
             raise BadInput("its law follows no reference.")
         most = self.rig.model.travel
         if abs(value) > min(most, 1e3):
@@ -183,6 +216,22 @@ class Station:
         self.stop("The bench was closed.")
         if self._thread is not None:
             self._thread.join(30.0)
+
+    @property
+    def gains(self) -> Array | None:
+        """Of the feedback that holds it in this run, or in the last one; None where the law is no feedback."""
+        return self._held_by if self.from_hanging else None if self.loop is None else self.loop.K
+
+    @property
+    def _swing_path(self) -> Path:
+        return self.folder / "swing_up.json"
+
+    def _design(self) -> None:
+        try:
+            self._held_by = np.array([json.loads(self._swing_up(self.rig, self._swing_path))])
+            self.hanging = ""
+        except UprightError as error:
+            self.hanging = str(error)
 
     def _operated(self, who: str) -> None:
         if self.lease.holder != who:
@@ -249,7 +298,8 @@ class Station:
             "operator": "nobody" if not holder else "you" if holder == who else "another",
             "time": last.time, "tick": last.tick, "late": last.late, "mode": last.mode.name,
             "faults": [text for fault, text in SENTENCES.items() if fault in last.faults],
-            "seconds": self.seconds, "verdict": self.verdict,
+            "seconds": self.seconds, "verdict": self.verdict, "hanging": self.hanging,
+            "from": HANGING if self.from_hanging else HELD,
         }  # fmt: skip
 
 
@@ -277,7 +327,7 @@ def obey(station: Station, who: str, message: ClientRequest) -> None:
         case "rearm":
             station.rearm(who)
         case "start":
-            station.start(who, **fields)
+            station.start(who, hanging=fields.pop("from", HELD) == HANGING, **fields)
         case "tap":
             station.tap(who, **fields)
         case "poles":

@@ -118,12 +118,21 @@ class RigRun:
         """Deviations from what was held, shape (N, coordinates)."""
         if self.log is None:
             return np.zeros((0, len(self.model.per_unit)))
-        return np.column_stack([self.log.columns[c.name] for c in self.model.plant.coordinates]) - self.end.target
+        away = np.column_stack([self.log.columns[c.name] for c in self.model.plant.coordinates]) - self.end.target
+        if self.request.from_rest and len(away):  # it may stand on either side of where it hung
+            away[:, -1] -= math.tau * round(away[-1, -1] / math.tau)
+        return away
+
+    @property
+    def stands(self) -> int:
+        """Row from which on it is upright to the end; behind the last one where it is not."""
+        off = np.flatnonzero(np.abs(self.away[:, -1:]).max(axis=1, initial=0.0) > ARRIVED)
+        return int(off[-1]) + 1 if off.size and self.request.from_rest else 0
 
     @property
     def unrest(self) -> tuple[float, ...]:
         """Root mean square of the deviations over the second half [rad or m]; from their mean with a reference."""
-        half = self.away[len(self.away) // 2 :]
+        half = self.away[max(len(self.away) // 2, min(self.stands, len(self.away) - 1)) :]
         half = half - half.mean(axis=0) if self.request.reference and half.size else half
         return tuple(np.sqrt(np.mean(half**2, axis=0)).tolist()) if half.size else ()
 
@@ -183,7 +192,8 @@ class RigRun:
     @property
     def sound(self) -> bool:
         """Whether it ran to its end, in time, with a whole log."""
-        return not self.end.stopped and self.complete and self.end.late <= TOLERATED * self.end.ticks
+        stood = not self.stands or self.stands < len(self.t)
+        return not self.end.stopped and self.complete and stood and self.end.late <= TOLERATED * self.end.ticks
 
     @property
     def verdict(self) -> str:
@@ -200,13 +210,18 @@ class RigRun:
         log = "" if self.complete else f" The log is incomplete: {end.log_message or 'rows are missing'}."
         if self.request.law is None:
             return f"The signal was put out for {how}{late}.{log}"
+        if self.stands and self.stands == len(self.t):
+            return f"Not swung up in {how}{late}; it is {math.degrees(abs(self.away[-1, -1])):.0f} degrees off.{log}"
+        up = f" It stands since {self.t[self.stands]:.3g} s." if self.stands else ""
         last = self.model.plant.coordinates[-1]
         size = max(self.unrest[-1], self.count[-1])
         size = f"{math.degrees(size):.2g} degrees" if last.unit == "rad" else f"{1e3 * size:.2g} mm"
         size = f"one encoder count, {size}" if self.unrest[-1] < self.count[-1] else size
         what = "varied by" if self.request.reference else "stayed within"
         kind = STABILISED if self.quiet and not self.saturates else SATURATED if self.quiet else BUSY
-        return f"{kind.capitalize()} for {how}{late}; {last.name} {what} {size} (rms, second half){self._rest()}.{log}"
+        return (
+            f"{kind.capitalize()} for {how}{late}; {last.name} {what} {size} (rms, second half){self._rest()}.{up}{log}"
+        )
 
     def _rest(self) -> str:
         if self.effort is None:
