@@ -128,6 +128,11 @@ def denominator(unit: str) -> str:
     return inner[:-1].rpartition("/(")[2] if inner.endswith(")") else inner.rpartition("/")[2] if "/" in inner else ""
 
 
+def is_acceleration(unit: str) -> bool:
+    """Whether a command in this unit is an acceleration, as of a stepper."""
+    return known(unit) and any(same_dimension(unit, a) for a in ("m/s^2", "rad/s^2"))
+
+
 def known(unit: str) -> bool:
     """Whether `unit` can be read."""
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -71,6 +72,21 @@ def test_such_a_law_is_not_armed(bench):
     bench(NOT_TRUSTED)
     with pytest.raises(BadInput, match=r"not armed on hardware.*explained to 41 %.*accept"):
         up.run("RIG.toml", law="design/design.json", out="runs")
+
+
+def test_a_drive_that_commands_an_acceleration_gets_no_pulse(bench):
+    """A pulse of force ends in rest by friction; of acceleration, in a speed that stays."""
+    stepper = (
+        STUDY.replace("0.65 N m/V", "1000 N m/(rad/s^2)").replace('"V"', '"rad/s^2"').replace("10 V", "60 rad/s^2")
+    )
+    Path("study.toml").write_text(stepper, encoding="utf-8")
+    Path("RIG.toml").write_text(SERIAL.replace("5 V", "50 rad/s^2"), encoding="utf-8")
+    with pytest.raises(BadInput, match=r"commanded by its acceleration.*check=False"):
+        up.run("RIG.toml", excite="step 1", out="runs")
+    with pytest.raises(BadInput, match=r"commanded by its acceleration.*pulse=False"):
+        up.rig_doctor("RIG.toml")
+    with pytest.raises(BadInput, match="no_such_board"):  # as far as the wire
+        up.run("RIG.toml", excite="step 1", out="runs", check=False)
 
 
 @pytest.mark.parametrize("accept", ["", "  "])

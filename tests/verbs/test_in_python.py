@@ -40,6 +40,7 @@ def test_an_option_called_otherwise_than_its_argument_is_told_by_the_argument():
         ("print it with `upright log show -o x`.", "print it with `upright log show -o x`."),
         ("type upright lab --quick, or leave --quick out.", "type upright lab --quick, or leave quick out."),
         ("poles such as -4+-2j, -1--2 and x-y stay", "poles such as -4+-2j, -1--2 and x-y stay"),
+        ("run it without: --no-check.", "run it without: check=False."),
         ("it hung upright here", "it hung upright here"),
         ("replace it with --force", "replace it with --force"),
     ],

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.errors import RigStopped
+from upright.errors import BadInput, RigStopped
 from upright.rig import Rig
 from upright.rigs import Fault
 from upright.rigs.rigfile import read_rig_file
 from upright.running.power_up import PAUSE, CheckupFinding, FirstPowerUp, Hand
 from upright.running.rig import model_and_truth, stage_of
+from upright.units import is_acceleration
 
 __all__ = ["Checkup", "CheckupFinding", "check_up"]
 
@@ -90,6 +91,11 @@ def check_up(
     """
     file = read_rig_file(path)
     model, _ = model_and_truth(file)
+    if file.hardware and pulse and is_acceleration(model.unit):
+        raise BadInput(
+            f"the drive of {path} is commanded by its acceleration, so that the pulses of the doctor would leave it "
+            "moving; look at the rest with --no-pulse."
+        )
     stage = stage_of(path, balance=False)
     beside, rig, out = stage.supervisor, stage.supervisor.rig, list[CheckupFinding]()
     steps = FirstPowerUp(beside=beside, model=model, hand=hand, wait=wait)

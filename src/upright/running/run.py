@@ -34,6 +34,7 @@ from upright.running.rig import (
     stage_of,
     usual_limits,
 )
+from upright.units import is_acceleration
 
 LEAST = 100
 """Fewest rows of which a last third tells anything."""
@@ -301,6 +302,11 @@ def prepared(request: RunRequest, folder: Path) -> PreparedRun:
     file = read_rig_file(request.rig)
     read = None if request.law is None else read_law(request.law)  # before what the rig lacks
     model, _ = model_and_truth(file)
+    if file.hardware and request.check and is_acceleration(model.unit):
+        raise BadInput(
+            f"the drive of {request.rig} is commanded by its acceleration, so that the small pulse before a run would "
+            "leave it moving; run it without one: --no-check."
+        )
     balance, basis = request.law is not None, MEASURED if file.hardware and request.law is None else model.basis
     zero = file.zero if file.zero in model.plant.equilibria else next(iter(model.plant.equilibria))
     at = file.at if file.at in model.plant.equilibria else zero

@@ -142,6 +142,9 @@ def worded(sentence: str, command: Command) -> str:
 
     def argument(match: re.Match[str]) -> str:
         option, value = match.groups()
+        switch, off, name = option.partition("no-")
+        if off and switch == "--" and not value:
+            return f"{name.replace('-', '_')}=False"
         name = arguments.get(option, option[2:].replace("-", "_"))
         if not name or name in command.flags:
             return match[0]

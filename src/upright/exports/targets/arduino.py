@@ -7,7 +7,7 @@ from upright.exports.targets import LawTarget, c
 from upright.exports.texts import filled
 from upright.exports.vector import ReplayVector
 from upright.laws import Law, Rule
-from upright.units import known, same_dimension
+from upright.units import is_acceleration
 
 _TRAVEL, _SPEED, _START = ({"rad": a, "m": b} for a, b in ((3.0, 0.3), (40.0, 3.0), (0.2, 0.02)))
 _RESOLUTION = 1.0
@@ -55,7 +55,7 @@ def sketch(made: SampledController) -> str:
         unit=made.command_unit or "command",
         reference="  law_real r[LAW_REFERENCES] = {0};  // FILL IN: what it shall follow\n" if made.references else "",
         r="r" if made.references else "0",
-        several=_SEVERAL if len(made.commands) > 1 else _ACCELERATION if _accelerates(made.command_unit) else "",
+        several=_SEVERAL if len(made.commands) > 1 else _ACCELERATION if is_acceleration(made.command_unit) else "",
     )  # fmt: skip
 
 
@@ -66,10 +66,6 @@ _ACCELERATION = (
     '#error "this law commands an acceleration, and board.h drives a bridge by PWM: in its place let your stepper go "'
     ' "at speed += command * 1e-6 * PERIOD, 0 after a stop"\n'
 )
-
-
-def _accelerates(unit: str) -> bool:
-    return known(unit) and any(same_dimension(unit, a) for a in ("m/s^2", "rad/s^2"))
 
 
 def _narrow(made: SampledController, miss: str) -> str:
