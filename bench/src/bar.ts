@@ -36,6 +36,7 @@ export class Bar {
     press("end", () => session.steer({ do: "end" }));
     press("rearm", () => session.steer({ do: "rearm" }));
     press("control", () => (session.state?.operator === "you" ? session.release() : session.steer({ do: "operate" })));
+    byId("from").addEventListener("change", () => this.show());
     byId("stop").addEventListener("click", () => session.stop());
     byId("dismiss").addEventListener("click", () => message(""));
     // Before anything else on the page can take the key.
@@ -50,6 +51,7 @@ export class Bar {
     badge.className = `badge ${scene.kind.toLowerCase()}`;
     say(badge, scene.kind);
     byId("tap").hidden = scene.kind !== "TWIN";
+    byId("from").hidden = scene.kind !== "TWIN" || Math.abs(scene.point.at(-1)! - Math.PI) > 1e-6;
     say(byId("rate"), `at ${significant(1 / scene.period / (scene.period < 1e-3 ? 1000 : 1), 3)} ${scene.period < 1e-3 ? "kHz" : "Hz"}`);
     document.title = `${scene.title}: bench`;
   }
@@ -60,11 +62,11 @@ export class Bar {
     byId("state").dataset["state"] = phase ?? "lost";
     say(byId("state"), phase ? WORD[phase] : "Not connected");
     say(byId("late"), `${state?.late ?? 0}`);
-    lock(byId("start"), unsteerable || (ended ? "" : phase === "stopped" ? "The rig is stopped; rearm it first." : "The rig runs already."));
     const from = byId<HTMLSelectElement>("from");
-    from.hidden = state?.hanging !== "";
+    const why = from.value === "hanging" ? (state?.hanging ?? "") : "";
     from.disabled = phase === "starting" || phase === "running";
     if (from.disabled && state) from.value = state.from;
+    lock(byId("start"), unsteerable || (ended ? why : phase === "stopped" ? "The rig is stopped; rearm it first." : "The rig runs already."));
     for (const id of ["end", "tap"]) lock(byId(id), unsteerable || (phase === "running" ? "" : "The rig does not run; start it first."));
     lock(byId("rearm"), unsteerable);
     const operator = state?.operator ?? "nobody";

@@ -130,8 +130,8 @@ def test_hanging_it_swings_up_and_stands_in_the_picture_as_in_the_frames(server,
 
         page.on("websocket", lambda socket: socket.on("framereceived", reading))
         page.reload()
-        page.wait_for_selector("#from:not([hidden])")
         page.select_option("#from", "hanging")
+        page.wait_for_selector("#start[aria-disabled=false]")  # its swing-up is designed
         one.starts()
         page.wait_for_function(STANDS, arg=math.radians(10))
         page.wait_for_timeout(3000)
