@@ -49,6 +49,11 @@ NOT_BUILT = (
 )
 
 
+def is_built() -> bool:
+    """Whether the page is there."""
+    return files("upright.browser").joinpath("page/index.html").is_file()
+
+
 def application(stations: Sequence[Station]) -> Starlette:
     """The bench of some rigs."""
     hubs = {station.rig.name: Hub(station) for station in stations}

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 def _until_closed(bench: Bench) -> Iterator[str]:
     """What the command line says, and waits for."""
+    from upright.browser.app import NOT_BUILT, is_built
+
+    if not is_built():
+        yield NOT_BUILT
     yield f"{', '.join(bench.rigs)}: {bench.url}"
     yield "Open this address in a browser; take control, then start. Logs and reports are kept in " + str(bench.folder)
     yield "Ctrl-C stops every rig and closes the bench. Keep a stop in hardware within reach: this is software."
