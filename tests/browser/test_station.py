@@ -307,6 +307,20 @@ def test_a_rig_without_a_swing_up_says_why(rig, tmp_path):
         assert made.state == "idle"
 
 
+def test_a_design_whose_process_is_killed_is_told_and_nothing_waits_for_it(rig, tmp_path):
+    def killed(rig, path):
+        raise RuntimeError("the process ended without an answer")
+
+    with station(rig, tmp_path) as (made, _, _):
+        made._swing_up = killed
+        made.prepare()
+        assert settled(made, lambda m: "not designed: the process ended" in m.hanging)
+        with pytest.raises(BadInput, match="not designed"):
+            ask(made, "operator", "start", **{"from": "hanging"})
+        ask(made, "operator", "start")
+        assert made.state == "starting"
+
+
 @pytest.mark.slow
 def test_the_furuta_twin_stands_within_ten_degrees_after_six_seconds_from_hanging(rig, tmp_path):
     """By its log, whose encoders begin at 0 and end half a turn on, on either side; its report says since when."""

@@ -232,6 +232,8 @@ class Station:
             self.hanging = ""
         except UprightError as error:
             self.hanging = str(error)
+        except RuntimeError as error:  # its process was killed, as with the bench that closes meanwhile
+            self.hanging = f"Its swing-up was not designed: {error}."
 
     def _operated(self, who: str) -> None:
         if self.lease.holder != who:
