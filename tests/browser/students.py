@@ -19,7 +19,7 @@ from tests.live.browser import CHROMIUM
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True, "device_scale_factor": 2}
 DESK = {"viewport": {"width": 1280, "height": 720}}
-PATIENCE = 90_000  # ms; the rig's kernel is compiled at the first request, on a machine that may do much else
+PATIENCE = 240_000  # ms; the rig's kernel is compiled at the first request, on a machine that may do much else
 
 
 class Server:
@@ -51,7 +51,7 @@ class Server:
     def close(self) -> None:
         """End it as Ctrl-C does."""
         self.process.send_signal(signal.SIGINT)
-        self.process.wait(60)
+        self.process.wait(PATIENCE / 1000)
 
 
 class Student:
@@ -71,6 +71,14 @@ class Student:
     def reads(self, selector: str, text: str) -> None:
         """Wait until something visible says a text."""
         self.page.locator(selector, has_text=re.compile(text)).first.wait_for(state="visible")
+
+    def until(self, wanted: Callable[[], bool]) -> None:
+        """Wait for what the page shows nobody, in steps of the browser's clock."""
+        for _ in range(PATIENCE // 50):
+            if wanted():
+                return
+            self.page.wait_for_timeout(50)
+        raise AssertionError("it did not come")
 
     def presses(self, selector: str) -> None:
         """Press a button, even one that is locked: it says why."""
@@ -98,9 +106,14 @@ class Student:
 
     def rearms(self) -> None:
         """Arm the rig again, once it has come to rest."""
-        while not self.page.locator("#state[data-state=idle]").count():
-            self.page.click("#rearm")
-            self.page.wait_for_timeout(200)  # the browser's clock; a rig on its way to rest refuses with a sentence
+        # a rig on its way to rest refuses with a sentence; pressed only while it is there to be pressed
+        self.page.wait_for_function(
+            """() => {
+          const idle = document.querySelector('#state[data-state=idle]');
+          if (!idle) document.querySelector('#latch:not([hidden]) #rearm:not([hidden])')?.click();
+          return idle }""",
+            polling=200,
+        )
 
 
 @contextmanager
@@ -110,7 +123,7 @@ def browser() -> Iterator[Any]:
     if CHROMIUM is None:
         pytest.skip("Chromium is missing")
     with playwright.sync_playwright() as runner:
-        opened = runner.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        opened = runner.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"], timeout=PATIENCE)
         yield opened
         opened.close()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,11 @@ def chromium():
         yield opened
 
 
+MOVED = "wanted => Math.abs(document.querySelector('#pairs input').valueAsNumber - wanted) < 0.06"
+"""Whether the first pair has a natural frequency."""
+ANOTHER_PLACE = "before => document.querySelector('#pairs tr:first-child td:last-child').innerText !== before"
+
+
 def tab_to(page, selector: str) -> None:
     """Press Tab until something has the focus."""
     page.evaluate("document.activeElement.blur()")
@@ -68,7 +74,7 @@ def test_a_whole_session_by_keyboard_alone(server, chromium):
         before = page.locator("#pairs input").first.input_value()
         for _ in range(5):
             page.keyboard.press("ArrowLeft")
-        assert float(page.locator("#pairs input").first.input_value()) == pytest.approx(float(before) + 1.0, abs=0.06)
+        page.wait_for_function(MOVED, arg=float(before) + 1.0)
         spoken = page.locator(".pole[role=slider]").first.get_attribute("aria-valuetext")
         assert re.fullmatch(r"natural frequency [\d.]+ rad/s, damping ratio [\d.]+", spoken)
         tab_to(page, "#apply")
@@ -93,12 +99,13 @@ def test_a_whole_session_by_mouse_until_it_falls(server, chromium):
                 break
             one.presses("#tap")
         one.sees("stopped")
+        one.reads("#latch-why", ".{20}")
         assert "operator" not in page.inner_text("#latch-why")  # the supervisor stopped it, and says why
-        assert len(page.inner_text("#latch-why")) > 20
         one.presses("#start")  # it is latched
         one.reads("#message", "rearm it first")
         one.rearms()
         page.fill("#next label:has-text('tap') input", "0.8")
+        page.fill("#next label:has-text('start') input", "0")
         one.starts()
         page.click("#tab-design")
         one.reads("#share", "rigs are stabilised")
@@ -109,7 +116,7 @@ def test_a_whole_session_by_mouse_until_it_falls(server, chromium):
         page.mouse.down()
         page.mouse.move(x - 12, y - 12, steps=4)
         page.mouse.up()
-        assert page.inner_text("#pairs tr:first-child td:last-child") != poles
+        page.wait_for_function(ANOTHER_PLACE, arg=poles)
         page.click("#apply")
         one.reads("#message", r"act from tick \d+")
         page.click("#tab-run")
@@ -270,23 +277,33 @@ def test_axe_finds_nothing_nothing_is_clipped_and_stop_lies_open(server, chromiu
 def test_the_first_load_is_below_400_kB_and_asks_nobody_else(server, chromium):
     loaded = []
     with student(chromium, server) as one:
-        one.page.on("response", lambda response: loaded.append((response.url, len(response.body()))))
+        one.page.on("response", loaded.append)
         one.page.reload()
         one.page.wait_for_selector("#tab-design:not([hidden])")
         one.page.click("#tab-design")
         one.reads("#share", "rigs are stabilised")
         assert one.foreign(server) == []
-    assert 10_000 < sum(size for _, size in loaded) < LIGHT, loaded
+        sizes = {response.url: len(response.body()) for response in loaded}
+    assert 10_000 < sum(sizes.values()) < LIGHT, sizes
 
 
 def test_a_whole_session_by_touch(server, chromium):
-    tablet = {"viewport": {"width": 1024, "height": 768}, "has_touch": True}
-    with student(chromium, server, **tablet) as one:
+    """Let go at what is held and tapped lightly: however slowly its time goes, that throws no pendulum over."""
+    tablet, sent = {"viewport": {"width": 1024, "height": 768}, "has_touch": True}, []
+
+    def listen(page):
+        page.on("websocket", lambda socket: socket.on("framesent", sent.append))
+
+    with student(chromium, server, prepare=listen, **tablet) as one:
         page = one.page
+        page.wait_for_selector("#tab-design:not([hidden])")
+        page.fill("#next label:has-text('start') input", "0")
+        page.fill("#next label:has-text('tap') input", "0.2")
         page.tap("#start")
         one.sees("running")
         one.reads("#rig-note", "touch it")
-        page.touchscreen.tap(40, 300)  # a finger beside the pendulum taps it; three would throw it over
+        page.touchscreen.tap(40, 300)  # a finger beside the pendulum taps it
+        one.until(lambda: any('"tap"' in message for message in sent))
         page.tap("#tab-design")
         one.reads("#share", "rigs are stabilised")
         box = page.locator(".pole[role=slider]").first.bounding_box()
@@ -297,7 +314,7 @@ def test_a_whole_session_by_touch(server, chromium):
             points = [] if step is None else [{"x": x - step, "y": y - step}]
             finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
         page.wait_for_selector("#apply[aria-disabled=false]")
-        assert page.inner_text("#pairs tr:first-child td:last-child") != before
+        page.wait_for_function(ANOTHER_PLACE, arg=before)
         page.tap("#apply")
         one.reads("#message", r"act from tick \d+")
         page.tap("#stop")
@@ -311,7 +328,7 @@ def test_of_several_rigs_each_has_its_page_and_one_without_a_drawing_says_why(ch
         at = "" if make == "linear" else 'at = "rest"\n'
         (tmp_path / f"{name}.toml").write_text(f'kind = "twin"\nname = "{name}"\nmake = "{make}"\n{at}', "utf-8")
     several = Server(tmp_path / "runs", tmp_path / "cart.toml", tmp_path / "disks.toml")
-    with student(chromium, several) as one:
+    with closing(several), student(chromium, several) as one:
         one.reads("#rig-name", "cart")
         one.reads("#strips", r"cart \[cm\]")
         one.page.click("#rigs a:has-text('disks')")
@@ -321,24 +338,27 @@ def test_of_several_rigs_each_has_its_page_and_one_without_a_drawing_says_why(ch
         one.starts()
         one.reads("#readings", "deg")
         one.leaves()
-    several.close()
 
 
 def test_all_samples_of_1_kHz_take_less_than_15_kB_a_second(server, chromium):
-    """Of a client; what a sample takes is asked, for how many come in a second is the machine's affair."""
+    """Of a client, with 40 frames a second; how many samples come in one is the machine's affair."""
     frames = []
+
+    def samples():
+        return [frame for frame in frames if isinstance(frame, bytes)]
 
     def listen(page):
         page.on("websocket", lambda socket: socket.on("framereceived", lambda frame: frames.append(frame)))
 
     with student(chromium, server, prepare=listen) as one:
         one.starts()
-        one.page.wait_for_timeout(3000)
+        one.until(lambda: len(samples()) >= 10)
         one.leaves()
-    samples = [frame for frame in frames if isinstance(frame, bytes)]
-    ticks = sum(int.from_bytes(frame[4:6], "little") for frame in samples)
-    assert ticks > 200
-    assert 1000 / ticks * sum(map(len, samples)) < 15_000
+    for frame in samples():
+        ticks, encoders = int.from_bytes(frame[4:6], "little"), frame[6]
+        each = 2 * (encoders + 1)  # bytes of a sample: an i16 for every encoder and one for the command
+        assert ticks > 0
+        assert 1000 * each + 40 * (len(frame) - each * ticks) < 15_000
 
 
 def test_on_hardware_poles_are_applied_only_after_a_second_press(server, chromium):
