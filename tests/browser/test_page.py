@@ -277,7 +277,7 @@ def test_axe_finds_nothing_nothing_is_clipped_and_stop_lies_open(server, chromiu
 def test_the_first_load_is_below_400_kB_and_asks_nobody_else(server, chromium):
     loaded = []
     with student(chromium, server) as one:
-        one.page.on("response", loaded.append)
+        one.page.on("response", lambda response: loaded.append(response))
         one.page.reload()
         one.page.wait_for_selector("#tab-design:not([hidden])")
         one.page.click("#tab-design")
@@ -292,7 +292,7 @@ def test_a_whole_session_by_touch(server, chromium):
     tablet, sent = {"viewport": {"width": 1024, "height": 768}, "has_touch": True}, []
 
     def listen(page):
-        page.on("websocket", lambda socket: socket.on("framesent", sent.append))
+        page.on("websocket", lambda socket: socket.on("framesent", lambda frame: sent.append(str(frame))))
 
     with student(chromium, server, prepare=listen, **tablet) as one:
         page = one.page
