@@ -335,3 +335,18 @@ def test_the_furuta_twin_stands_within_ten_degrees_after_six_seconds_from_hangin
     since = t[np.flatnonzero(off)[-1] + 1] - t[0]
     assert f"It stands since {since:.3g} s." in report_apart(run, end, 0.0)
     assert listed(tmp_path, "furuta")[0]["report"] == "/rigs/furuta/runs/run.html"
+
+
+@pytest.mark.parametrize(
+    ("by", "does", "told"),
+    [("operator", "end", "Ended by its operator."), ("operator", "stop", "Stopped by its operator."),
+     ("a watcher", "stop", "Stopped by somebody who watches.")],
+)  # fmt: skip
+def test_a_report_says_who_ended_its_run_and_how(at_work, by, does, told):
+    made, carry, _ = at_work
+    made._report = lambda run, end, started: end.stopped
+    ask(made, "operator", "start")
+    carry.go()
+    ask(made, by, does)
+    carry.end("Stopped by hand.")  # all that the loop knows
+    assert settled(made, lambda m: m.verdict == told)

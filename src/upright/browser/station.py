@@ -269,13 +269,15 @@ class Station:
         except BaseException:
             self._ended("The run failed by a bug; see what the server printed.")
             raise
-        self._ended(end.stopped, end)
+        why = self._ended(end.stopped, end)
+        if end.stopped == BY_HAND:  # the loop does not know by whose
+            end = replace(end, stopped=why or "Ended by its operator.")
         try:
             self.verdict = self._report(run, end, started)
         except UprightError as error:
             self.verdict = f"There is no report: {error}"
 
-    def _ended(self, why: str, end: RunEnd | None = None) -> None:
+    def _ended(self, why: str, end: RunEnd | None = None) -> str:
         with self._lock:
             self.over = True
             if end is not None:
@@ -283,6 +285,7 @@ class Station:
             if self.state != STOPPED:
                 by_operator = self._ending and why == BY_HAND
                 self.state, self.why = (STOPPED, why) if why and not by_operator else (ENDED, "")
+            return self.why
 
     def _watch(self, state: RunState) -> str:
         self.last = state
