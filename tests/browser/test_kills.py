@@ -61,6 +61,11 @@ def server(tmp_path):
         process.communicate()  # ends with the last process that holds its output, which is the loop's
 
 
+def _hears() -> None:
+    """Ctrl-C, also where these tests run in a shell's background."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @contextmanager
 def started(process):
     """An operator who has asked for a run."""
@@ -167,14 +172,14 @@ def test_a_loop_that_is_killed_is_a_stop_with_a_sentence(server):
 def test_the_command_prints_its_address_and_ctrl_c_ends_it_with_every_rig_at_rest(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "upright", "bench", "--port", "0", "--no-browser", "--no-fifo", "-o", "out"],
-        env=ours(), cwd=tmp_path, stdout=subprocess.PIPE, text=True,
+        env=ours(), cwd=tmp_path, stdout=subprocess.PIPE, text=True, preexec_fn=_hears,
     )  # fmt: skip
     process.url = process.stdout.readline().split()[-1]
     with started(process) as socket:
         state_of(socket, "running")
         process.send_signal(signal.SIGINT)
         assert "closed" in state_of(socket, "stopped")["why"]
-    process.communicate(timeout=60)
+    process.communicate(timeout=240)
     assert process.returncode == 0
     log = read_log(tmp_path / "out" / "furuta" / "run.mcap")
     assert not log.complaint
@@ -207,3 +212,39 @@ def test_a_run_in_the_browser_is_kept_with_a_report_and_replays_to_the_last_bit(
     assert "law" in [event.kind for event in log.events]
     assert max(log.columns["reference"]) == 0.3
     assert replay(log).identical
+
+
+# with reports, and closed as the command closes it
+CLOSED = (
+    SERVER.replace(' report=lambda *_: "",', "")
+    .replace("    bench.wait()", "    for line in _until_closed(bench):\n        print(line, flush=True)")
+    .replace("if __name__", "from upright.verbs.control.bench import _until_closed\n\nif __name__")
+)
+
+
+@pytest.mark.parametrize("when", ["starting", "running", "ended"])
+def test_ctrl_c_on_the_whole_group_ends_the_bench_in_order_and_prints_no_traceback(tmp_path, when):
+    """As a terminal sends it: to the loop's process and to that of the report too; and once more, by impatience."""
+    (tmp_path / "out").write_bytes(BLANK)
+    (tmp_path / "server.py").write_text(CLOSED, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, str(tmp_path / "server.py"), str(tmp_path)], env=ours(), cwd=ROOT, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hears,
+    )  # fmt: skip
+    try:
+        process.url = process.stdout.readline().strip()
+        with started(process) as socket:
+            state_of(socket, when if when == "starting" else "running")
+            if when == "ended":
+                socket.send(json.dumps({"do": "end"}))
+                state_of(socket, "ended")
+            os.killpg(process.pid, signal.SIGINT)
+            while "Stopping every rig." not in (line := process.stdout.readline()):
+                assert line
+            os.killpg(process.pid, signal.SIGINT)
+            _, errors = process.communicate(timeout=240)
+    finally:
+        process.kill()
+        process.communicate()
+    assert (process.returncode, errors) == (0, "")
+    assert put_out(tmp_path / "out")[:2] == (0.0, 0)

@@ -15,6 +15,7 @@ from typing import Any
 from upright.browser.rig import NO_LAW
 from upright.errors import UprightError
 from upright.files import replace_file
+from upright.realtime.interrupts import ignoring
 from upright.realtime.session import RunEnd
 from upright.report.html import write_html
 from upright.running.chapter import run_chapter
@@ -60,18 +61,19 @@ def in_own_process(task: Callable[..., str], *arguments: Any) -> str:
 
     Raises
     ------
-    RuntimeError
-        When the process ends without an answer.
+    UprightError
+        Also when the process ends without an answer: by a bug, which it has printed, or since the bench is closed.
     """
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_perform, args=(theirs, task, arguments), daemon=True, name="upright clerk")
-    process.start()
+    with ignoring():  # Ctrl-C reaches a whole group of processes; what is begun is written
+        process.start()
     theirs.close()
     try:
         answer = ours.recv()
     except EOFError:
-        raise RuntimeError("the process that was to write this ended without an answer") from None
+        raise UprightError("the process that was to write this ended without an answer.") from None
     finally:
         process.join()
         ours.close()

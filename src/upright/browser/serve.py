@@ -16,6 +16,7 @@ from upright.browser.messages import LONGEST
 from upright.browser.rig import BenchRig, known_rig
 from upright.browser.station import Station
 from upright.errors import BadInput
+from upright.realtime.interrupts import ENDING, ignoring
 
 TWIN = 'kind = "twin"\nname = "furuta"\nmake = "furuta"\n'
 
@@ -54,29 +55,33 @@ class Bench:
                 access_log=False, server_header=False, timeout_graceful_shutdown=2, limit_concurrency=1024,
             )
         )  # fmt: skip
-        self._thread = threading.Thread(
-            target=self._server.run, kwargs={"sockets": [self._socket]}, name="bench", daemon=True
-        )
-        self._thread.start()
-        pause = threading.Event()
-        while not self._server.started and self._thread.is_alive():
-            pause.wait(0.01)
+        self._over = threading.Event()  # Python 3.11 takes a thread whose join was interrupted for one that has ended
+        threading.Thread(target=self._serve, name="bench", daemon=True).start()
+        while not self._server.started and not self._over.wait(0.01):
+            pass
         atexit.register(self.close)  # before multiprocessing waits for the loops
 
     def close(self) -> None:
-        """Stop every rig, then the server."""
-        atexit.unregister(self.close)
-        for station in self.stations:
-            station.stop("The bench was closed.")
-        for station in self.stations:
-            station.close()
-        self._server.should_exit = True
-        self._thread.join(10.0)
-        self._socket.close()
+        """Stop every rig, then the server, whoever is impatient meanwhile."""
+        with ignoring(ENDING):
+            atexit.unregister(self.close)
+            for station in self.stations:
+                station.stop("The bench was closed.")
+            for station in self.stations:
+                station.close()
+            self._server.should_exit = True
+            if self._over.wait(10.0):  # it closes what it listens to itself, or is still to do it
+                self._socket.close()
 
     def wait(self, seconds: float | None = None) -> None:
         """Wait until it is closed, or for so long [s]."""
-        self._thread.join(seconds)
+        self._over.wait(seconds)
+
+    def _serve(self) -> None:
+        try:
+            self._server.run(sockets=[self._socket])
+        finally:
+            self._over.set()
 
     def __enter__(self) -> Self:
         """Itself."""

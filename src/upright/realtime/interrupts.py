@@ -18,9 +18,16 @@ ENDING: tuple[signal.Signals, ...] = tuple(
 
 @contextmanager
 def ignoring(signals: Sequence[signal.Signals] = INTERRUPT) -> Generator[None]:
-    """Ignore signals meanwhile, in this process and in those that it starts; nothing in a thread, which gets none."""
+    """Ignore signals meanwhile, in this process and in those that it starts; in these alone from another thread."""
     if threading.current_thread() is not threading.main_thread():
-        yield
+        if not hasattr(signal, "pthread_sigmask"):
+            yield
+            return
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
         return
     before = {each: signal.signal(each, signal.SIG_IGN) for each in signals}
     try:
