@@ -56,14 +56,14 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
 
 def _lines(found: Jitter, *, asked: bool) -> list[Line]:
     """Share of ticks that were late, and of the time that a tick's work may take, both in the column of the times."""
-    q, share = found.quantiles, found.late / (TOLERATED * found.behind.size)
+    q, share = found.quantiles, found.late / (TOLERATED * found.due)
     right = asked and found.standing.priority == "FIFO"
     name = f"{1 / found.period:.0f} Hz, {found.standing.priority}"
     late = Line(
         contender=f"{name}: late ticks by those allowed",
         ratio=(share, share, share),
         target=Target(most=1.0) if right else None,
-        note=f"{found.late} of {found.behind.size} late; p50 {1e6 * q['p50']:.0f}, p99.9 {1e6 * q['p99.9']:.0f}, "
+        note=f"{found.late} of {found.due} late; p50 {1e6 * q['p50']:.0f}, p99.9 {1e6 * q['p99.9']:.0f}, "
         f"largest {1e6 * q['max']:.0f} us",
     )
     work = Line(
@@ -89,6 +89,6 @@ def _row(found: Jitter) -> str:
     times = " | ".join(f"{1e6 * v:.0f} µs" for v in q)
     more = f"{found.promising} Hz" if found.promising else ""
     return (
-        f"| {1 / found.period:.0f} Hz | {found.standing.priority} | {found.late} of {found.behind.size} | {times} | "
+        f"| {1 / found.period:.0f} Hz | {found.standing.priority} | {found.late} of {found.due} | {times} | "
         f"{found.rate:g} Hz | {more} | {found.stolen:.2g} s |"
     )

@@ -69,10 +69,10 @@ def test_every_tick_is_shown_and_logged_as_it_was(tmp_path):
 
 
 class Late(Virtual):
-    """A clock by which every tick is two late."""
+    """A clock by which every tick is late, and the one before it was passed over."""
 
     def wait(self):
-        self.late += 2
+        self.late, self.passed = self.late + 2, self.passed + 1
         return 0.0
 
 
@@ -84,6 +84,7 @@ def test_a_run_lasts_to_the_tick_that_ends_its_seconds_and_at_least_one_by_the_c
         )
         assert {s.phase for s in shown} == {"running"}
         assert (end.ticks, end.late, end.warning) == (ticks, 2 * ticks, f"slow at {RIG.period:g} s")
+        assert end.due == end.late  # all that were due
         (tmp_path / "run.mcap").unlink()
 
 
@@ -107,7 +108,7 @@ def test_samples_that_a_pacing_rig_lost_are_late_ticks(tmp_path):
 
     end, shown, _ = run_of(tmp_path, stage=stage)
     assert end.ticks == TICKS
-    assert end.late == TICKS  # one lost before each
+    assert (end.late, end.due) == (TICKS, 2 * TICKS)  # one lost before each
     assert shown[-1].late == TICKS
 
 

@@ -331,6 +331,9 @@ def test_a_run_is_sound_with_a_whole_log_and_few_late_ticks(folder, tmp_path):
     assert ended(ticks=1000, late=math.floor(1000 * TOLERATED)).sound
     assert not ended(ticks=1000, late=math.floor(1000 * TOLERATED) + 1).sound
     assert "1000 ticks, 1 of them late." in ended(ticks=1000, late=1).verdict
+    missed = ended(ticks=5216, late=7061, passed=2300)  # of 7516 deadlines
+    assert "5216 ticks of 7516 due, 7061 of them late." in missed.verdict
+    assert "5216 of 7516 due, 7061 late (94 %)" in dict(run_chapter(missed).parts[0].content[0].pairs).values()
     missing = ended(dropped=1)
     assert not missing.complete
     assert not missing.sound

@@ -43,8 +43,8 @@ class Jitter:
         How far behind its deadline each tick was woken [s].
     overslept : array, shape (N,)
         How much later than requested the sleep before it ended [s]; see `realtime.pace`.
-    late : int
-        Ticks that were late: see `realtime.pace`.
+    late, passed : int
+        Ticks that were late, and those of them that were passed over: see `realtime.pace`.
     work : array, shape (N,)
         Time that the work of each tick took [s].
     stolen : float
@@ -58,6 +58,12 @@ class Jitter:
     work: Array
     standing: LoopPriority
     stolen: float = 0.0
+    passed: int = 0
+
+    @property
+    def due(self) -> int:
+        """Ticks that were due, of which some were late."""
+        return self.behind.size + self.passed
 
     @property
     def quantiles(self) -> dict[str, float]:
@@ -68,7 +74,7 @@ class Jitter:
     @property
     def held(self) -> bool:
         """Whether the rate that was tried is held."""
-        return self.late <= TOLERATED * self.behind.size
+        return self.late <= TOLERATED * self.due
 
     @property
     def rate(self) -> float:
@@ -96,7 +102,7 @@ class Jitter:
     def verdict(self) -> str:
         """What it says of this machine, in a sentence or two."""
         tried = 1.0 / self.period
-        head = f"{self.late} of {self.behind.size} ticks were late at {tried:.4g} Hz ({self.standing.priority})"
+        head = f"{self.late} of {self.due} ticks were late at {tried:.4g} Hz ({self.standing.priority})"
         if self.held:
             more = f" There seems to be time for {self.promising} Hz, which was not tried." if self.promising else ""
             return f"{head}: this machine holds {tried:.4g} Hz as it is now.{more}"
@@ -171,6 +177,7 @@ def _measured(pipe: Any, seconds: float, rate: float, fifo: bool, make: Callable
     except UprightError as error:
         pipe.send(error)
     else:
-        result = {"behind": behind, "overslept": overslept, "work": work, "late": pace.late, "standing": standing}
+        late = {"late": pace.late, "passed": pace.passed}
+        result = {"behind": behind, "overslept": overslept, "work": work, "standing": standing, **late}
         pipe.send(result)
     pipe.close()

@@ -18,9 +18,10 @@ _MONOTONIC = 1  # CLOCK_MONOTONIC
 
 
 class Pace(Protocol):
-    """When the next tick is."""
+    """When the next tick is; how many were late so far, and how many of these were passed over."""
 
     late: int
+    passed: int
 
     def wait(self) -> float:
         """Wait for the next deadline; how far behind it we were woken [s]."""
@@ -36,7 +37,7 @@ class Virtual:
     """Time that passes with the samples, as on a twin or by a rig's own clock: nothing is waited for."""
 
     def __init__(self) -> None:
-        self.late = 0
+        self.late = self.passed = 0
 
     def wait(self) -> float:
         """Return at once."""
@@ -86,7 +87,9 @@ class WallClock:
     Attributes
     ----------
     late : int
-        Ticks that were late so far.
+        Ticks that were late so far, those that were passed over among them.
+    passed : int
+        Ticks that were due and passed over.
     overslept : float
         How much later than requested the last sleep ended, most of which a vigil hides [s]; 0 where there was no sleep.
     """
@@ -95,7 +98,7 @@ class WallClock:
         self, period: float, now: Callable[[], int] = time.monotonic_ns, sleep: Callable[[int], None] | None = None,
         *, vigil: float = 0.0,
     ) -> None:  # fmt: skip
-        self.period, self.late, self.overslept = period, 0, 0.0
+        self.period, self.late, self.passed, self.overslept = period, 0, 0, 0.0
         self._now, self._sleep = now, sleep or _sleeper()
         self._vigil = round(1e9 * vigil_within(period, vigil))
         self._first, self._tick = -1, 0
@@ -120,5 +123,6 @@ class WallClock:
         if behind >= self.period:
             missed = int(behind / self.period)
             self.late += missed
+            self.passed += missed
             self._tick += missed
         return behind

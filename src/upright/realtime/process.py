@@ -134,7 +134,7 @@ def run_in_process(
         raise RuntimeError(f"the loop's process failed:\n{answer}")
     state = window.get()
     return RunEnd(
-        ticks=state.tick, late=state.late,
+        ticks=state.tick, late=state.late, passed=max(0, state.late - state.tick),  # at least
         stopped=f"The loop's process was killed (code {child.exitcode}) {state.time:.3g} s into the run; the rig's own "
         "watchdog zeroes its command. The log holds what came before.",
         faults=Fault.WATCHDOG,

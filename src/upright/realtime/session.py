@@ -121,8 +121,10 @@ class RunEnd:
 
     Attributes
     ----------
-    ticks, late : int
+    ticks : int
         Of the loop.
+    late, passed : int
+        Ticks that were late, and those of them that were passed over, which the loop never had.
     stopped : str
         Why it ended early, as a sentence; empty when it ran to its end.
     about : Capabilities or None
@@ -143,6 +145,7 @@ class RunEnd:
 
     ticks: int = 0
     late: int = 0
+    passed: int = 0
     stopped: str = ""
     faults: Fault = NO_FAULT
     about: Capabilities | None = None
@@ -154,6 +157,11 @@ class RunEnd:
     events: tuple[tuple[float, str, str], ...] = ()
     warning: str = ""
     seconds: float = 0.0
+
+    @property
+    def due(self) -> int:
+        """Ticks that were due, of which some were late."""
+        return self.ticks + self.passed
 
 
 @dataclass(eq=False)
@@ -256,8 +264,9 @@ def _loop(
             if not beside.stale:
                 _row(log, beside, tick, following, command, beside.references if order.references else ())
             if about.paced:
-                pace.late += max(0, following.tick - tick.tick - 1)
-            end["ticks"], end["late"] = end["ticks"] + 1, pace.late
+                lost = max(0, following.tick - tick.tick - 1)
+                pace.late, pace.passed = pace.late + lost, pace.passed + lost
+            end |= {"ticks": end["ticks"] + 1, "late": pace.late, "passed": pace.passed}
             show(_state(beside, following, command, first, end))
             tick = following
         beside.step(tick)  # a fault of the last sample is one too

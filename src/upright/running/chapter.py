@@ -26,8 +26,8 @@ def run_chapter(run: RigRun) -> Chapter:
     facts: list[tuple[str, str]] = []
     if end.about is not None:
         facts.append(("rig", f"{end.about.name}, a tick every {1e3 * end.about.period:.4g} ms"))
-    share = f"{two_figures(100 * end.late / end.ticks)} %" if end.ticks else "none"
-    facts += [("ticks", f"{end.ticks}, {end.late} late ({share})"),
+    share = f"{two_figures(100 * end.late / end.due)} %" if end.due else "none"
+    facts += [("ticks", f"{end.ticks}{f' of {end.due} due' * (end.passed > 0)}, {end.late} late ({share})"),
               ("log", f"{run.log_path.name}: {end.rows} rows, {end.dropped} dropped")]  # fmt: skip
     if run.unrest:
         facts += [
@@ -53,7 +53,7 @@ def run_chapter(run: RigRun) -> Chapter:
         title=f"Run on {run.model.name}", verdict=run.verdict, sound=run.sound and run.quiet,
         parts=tuple(parts),
         warnings=warnings, steps=_steps(run, rig), numbers=_numbers(run),
-        findings=(KeyNumber(what="late ticks", value=f"{end.late} of {end.ticks}"),),
+        findings=(KeyNumber(what="late ticks", value=f"{end.late} of {end.due}"),),
     )  # fmt: skip
     return resting_on(chapter, run.basis, run.file.performed)
 
@@ -127,7 +127,7 @@ def jitter_chapter(jitter: Jitter) -> Chapter:
     q = {n: f"{1e6 * v:.3g} µs" for n, v in jitter.quantiles.items()}
     work, longer = np.percentile(jitter.work, [50, 99]).tolist()
     facts = Facts((
-        *q.items(), ("late ticks", f"{jitter.late} of {jitter.behind.size}"), ("priority", jitter.standing.priority),
+        *q.items(), ("late ticks", f"{jitter.late} of {jitter.due}"), ("priority", jitter.standing.priority),
         ("memory", "locked" if jitter.standing.locked else "not locked"),
         ("processors", "kept awake" if jitter.standing.awake else "may sleep between ticks"),
         *((("taken by the host", f"{jitter.stolen:.2g} s"),) if jitter.stolen else ()),
@@ -139,7 +139,7 @@ def jitter_chapter(jitter: Jitter) -> Chapter:
         name="jitter", draw=lambda: jitter_figure(jitter), caption="How far behind its deadline each tick was woken.",
         description="Histogram of the lateness of all ticks, both axes logarithmic.",
     )  # fmt: skip
-    late = jitter.late / jitter.behind.size
+    late = jitter.late / jitter.due
     steps = [Step("Measure longer, with what else will run beside the loop.", "upright rig check --seconds 600")]
     if jitter.promising:
         steps.append(Step("Try a faster loop.", f"upright rig check --rate {jitter.promising}"))

@@ -194,7 +194,7 @@ class RigRun:
     def sound(self) -> bool:
         """Whether it ran to its end, in time, with a whole log."""
         stood = not self.stands or self.stands < len(self.t)
-        return not self.end.stopped and self.complete and stood and self.end.late <= TOLERATED * self.end.ticks
+        return not self.end.stopped and self.complete and stood and self.end.late <= TOLERATED * self.end.due
 
     @property
     def verdict(self) -> str:
@@ -206,7 +206,7 @@ class RigRun:
         if end.stopped:
             ran = f" after {self.t[-1]:.3g} s" if self.t.size else " before its loop began"
             return f"Stopped{ran}: {end.stopped}"
-        how = f"{self.request.seconds:g} s, {end.ticks} ticks"
+        how = f"{self.request.seconds:g} s, {end.ticks} ticks{f' of {end.due} due' * (end.passed > 0)}"
         late = f", {end.late} of them late" if end.late else ", none late"
         log = "" if self.complete else f" The log is incomplete: {end.log_message or 'rows are missing'}."
         if self.request.law is None:
