@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import signal
+import subprocess
 import sys
 import threading
+from contextlib import nullcontext
 
 import pytest
 
@@ -61,6 +63,23 @@ def test_a_thread_that_gets_no_signals_changes_none(heard):
     thread.join()
     assert inside == [signal.getsignal(signal.SIGINT)]
     assert inside != [signal.SIG_IGN]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_processes_that_a_thread_starts_meanwhile_do_not_hear_ctrl_c_and_later_ones_do():
+    """What a thread blocks is blocked in what it starts (POSIX), from the first instruction on."""
+    masks = []
+
+    def work():
+        for meanwhile in (True, False):
+            with ignoring() if meanwhile else nullcontext():
+                status = subprocess.run(["cat", "/proc/self/status"], capture_output=True, text=True, check=True).stdout
+            masks.append(int(next(line for line in status.splitlines() if line.startswith("SigBlk:")).split()[1], 16))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert [bool(mask >> (signal.SIGINT - 1) & 1) for mask in masks] == [True, False]
 
 
 def test_a_handler_that_is_not_python_s_own_becomes_the_system_s(monkeypatch, heard):
