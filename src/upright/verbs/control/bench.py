@@ -21,16 +21,20 @@ def _until_closed(bench: Bench) -> Iterator[str]:
 
     if not is_built():
         yield NOT_BUILT
+    from signal import SIGTERM, default_int_handler, signal
+
+    from upright.realtime.interrupts import ENDING, ignoring
+
+    signal(SIGTERM, default_int_handler)
     yield f"{', '.join(bench.rigs)}: {bench.url}"
     yield "Open this address in a browser; take control, then start. Logs and reports are kept in " + str(bench.folder)
     yield "Ctrl-C stops every rig and closes the bench. Keep a stop in hardware within reach: this is software."
-    from signal import SIGTERM, default_int_handler, signal
-
-    signal(SIGTERM, default_int_handler)
     try:
         bench.wait()
     except KeyboardInterrupt:
-        yield "Stopping every rig."
+        with ignoring(ENDING):  # one is enough
+            yield "Stopping every rig."
+            bench.close()
     finally:
         bench.close()
 
