@@ -223,7 +223,7 @@ CLOSED = (
 )
 
 
-@pytest.mark.parametrize("when", ["running", "ended"])
+@pytest.mark.parametrize("when", ["starting", "running", "ended"])
 def test_ctrl_c_on_the_whole_group_ends_the_bench_in_order_and_prints_no_traceback(tmp_path, when):
     """As a terminal sends it: to the loop's process and to that of the report too; and once more, by impatience."""
     (tmp_path / "out").write_bytes(BLANK)
@@ -235,7 +235,7 @@ def test_ctrl_c_on_the_whole_group_ends_the_bench_in_order_and_prints_no_traceba
     try:
         process.url, _, _ = [process.stdout.readline().split()[-1] for _ in range(3)]
         with started(process) as socket:
-            state_of(socket, "running")
+            state_of(socket, "starting" if when == "starting" else "running")
             if when == "ended":
                 socket.send(json.dumps({"do": "end"}))
                 state_of(socket, "ended")

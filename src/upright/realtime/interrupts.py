@@ -23,6 +23,9 @@ def ignoring(signals: Sequence[signal.Signals] = INTERRUPT) -> Generator[None]:
         if not hasattr(signal, "pthread_sigmask"):
             yield
             return
+        from multiprocessing.resource_tracker import ensure_running
+
+        ensure_running()  # of multiprocessing; where it starts meanwhile, it lets these signals through again
         held = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
         try:
             yield
