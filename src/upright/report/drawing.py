@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from functools import cache, wraps
 from io import BytesIO, StringIO
@@ -121,6 +121,10 @@ NARROW = 3.6
 """Width of a figure on a phone [inch]: its letters of 9 points stand there as 11 px."""
 
 
+BUCKETS_NARROW = 80
+"""Of each curve there; every one shows its least and its greatest sample."""
+
+
 @styled
 def narrowed(drawing: Figure) -> bool:
     """Lay a figure out for a phone: panels below one another, long titles in several lines; False where it fits one."""
@@ -133,6 +137,8 @@ def narrowed(drawing: Figure) -> bool:
     places = {(spec.num1, spec.num2) for spec, _ in panels}
     if grid is not None and grid.ncols > 1 and all(first == last for first, last in places):
         order = sorted(first for first, _ in places)
+        if _named_by_its_edges({spec.num1: ax for spec, ax in panels}, grid.ncols):
+            order.sort(key=lambda place: (place % grid.ncols, place))  # column by column
         stacked = drawing.add_gridspec(len(order), 1)
         for spec, ax in panels:
             ax.set_subplotspec(stacked[order.index(spec.num1)])
@@ -149,6 +155,40 @@ def narrowed(drawing: Figure) -> bool:
             ax.set_yticks(ax.get_yticks(), [fill(word, 16) for word in words])
         for text in ax.texts if len(ax.texts) > 20 else ():  # of the cells of a table
             text.set_fontsize(6)
+        for line in ax.lines:
+            x, y = (np.asarray(column, dtype=np.float64) for column in line.get_data())
+            line.set_data(*decimated(x, y, BUCKETS_NARROW) if x.size == y.size else (x, y))
+        ax.set_xlabel(fill(ax.get_xlabel(), 40))
+    for owner in (drawing, *drawing.axes):
+        _stack_legend(owner)
+    return True
+
+
+def _stack_legend(owner: Any) -> None:
+    """Entries of a legend that stand in a row go below one another, two by two where they are short."""
+    legends = owner.legends if hasattr(owner, "legends") else filter(None, [owner.get_legend()])
+    for legend in tuple(legends):
+        words = [text.get_text() for text in legend.get_texts()]
+        if len(words) < 3 or getattr(legend, "_ncols", 1) < 3:
+            continue
+        handles, outside = legend.legend_handles, getattr(legend, "_outside_loc", None)
+        legend.remove()
+        if outside:
+            owner.legend(handles, words, loc=f"outside {outside} center", ncols=2 if max(map(len, words)) <= 20 else 1)
+        else:
+            owner.legend(handles, words, loc="lower left", bbox_to_anchor=(0.0, 1.0))
+            owner.figure.set_figheight(owner.figure.get_figheight() + 0.17 * len(words))
+
+
+def _named_by_its_edges(panels: Mapping[int, Axes], columns: int) -> bool:
+    """Whether a grid has titles above its first row alone; every panel then gets those of its column and its row."""
+    titles = {place: ax.get_title(loc="left") for place, ax in panels.items()}
+    rows = max(panels) // columns
+    if not rows or not all(bool(title) == (place < columns) for place, title in titles.items()):
+        return False
+    for place, ax in panels.items():
+        ax.set_title(titles[place % columns], loc="left")
+        ax.set_ylabel(ax.get_ylabel() or panels[place - place % columns].get_ylabel())
     return True
 
 

@@ -207,4 +207,6 @@ def _verdict(ladder: Ladder) -> str:
     last = ladder.accepted[-1]
     names = " + ".join(s.rung.name for s in ladder.accepted)
     scores = f"{percent(last.predicted_percent)} predicted on average, {percent(last.fit_percent)} fitted"
+    if last.predicted_percent <= 0:  # no better than the mean of what was held out
+        return f"No rung predicts what was held out. The best is {names}: {scores}."
     return f"The data ask for {names}: {scores}."

@@ -75,7 +75,7 @@ def energy_figure(t: Array, stored: Array, dissipated: Mapping[str, Array]) -> F
         edgecolor="white",
         linewidth=0.4,
     )
-    for layer, hatch in zip(ax.collections, ("", "///", "\\\\\\", "...", "xxx", "|||", "---"), strict=False):
+    for layer, hatch in zip(ax.collections, ("", "///", "\\\\\\", "+++", "xxx", "|||", "---"), strict=False):
         layer.set_hatch(hatch)  # tells the areas apart on grey paper
     ax.set_xlabel("time [s]")
     ax.set_ylabel("energy [mJ]")

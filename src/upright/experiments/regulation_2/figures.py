@@ -23,8 +23,8 @@ COLOURS: Mapping[str, tuple[str, str]] = {
     "stabilised": (SKY, ""),
     "stabilised with saturation": (SKY, "///"),
     "stabilised with excessive effort": (ORANGE, "///"),
-    "does not settle": (ORANGE, "..."),
-    "leaves its travel": (PALE, "..."),
+    "does not settle": (ORANGE, "|||"),
+    "leaves its travel": (PALE, "---"),
     "falls": (VERMILLION, "xxx"),
 }
 """Fill and hatching of every end of a run, so that grey print tells them apart."""

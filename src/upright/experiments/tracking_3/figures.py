@@ -73,13 +73,12 @@ def steps_figure(
         for ax in axes:
             ax.axvline(DWELL, color=GREY, linewidth=0.8, linestyle="-.")
         axes[0].text(DWELL, 0.97 * high, " push begins", va="top", fontsize=8.5, color=GREY)
-    drawing.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=6, columnspacing=1.2)
+    drawing.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=6, columnspacing=1.2)
     axes[-1].set_xlabel("time from the step [s]")
     hide_times = axes[:-1] if kick is None else axes[:-2]
     for ax in hide_times:
         ax.tick_params(labelbottom=False)
-    for ax in axes:
-        ax.yaxis.set_label_coords(-0.085, 0.5)
+    drawing.align_ylabels(axes)
     return drawing
 
 

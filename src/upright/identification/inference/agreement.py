@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.model.fit import Estimate
+from upright.quantities import two_figures
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,10 @@ class ParameterAgreement:
     @property
     def amount(self) -> str:
         """The difference relative to the first estimate, and in its standard errors."""
-        by = f"{100 * self.relative:+.2g} %".replace("-", "\u2212") if math.isfinite(self.relative) else ""
+        sign = "" if self.relative < 0 else "+"
+        by = (
+            f"{sign}{two_figures(100 * self.relative)} %".replace("-", "\u2212") if math.isfinite(self.relative) else ""
+        )
         errors = abs(self.difference) / self.stderr if self.stderr else math.inf
         many = "" if math.isinf(errors) else "over 100" if errors > 100 else f"{errors:.1f}"
         return ", ".join(filter(None, (by, f"{many} standard errors" if many else "")))

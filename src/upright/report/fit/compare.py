@@ -123,6 +123,8 @@ def _prediction(compared: Comparison, beaten: list[str]) -> str:
     base = [run.worst(BLACK_BOX) for run in compared.new.values() if BLACK_BOX in run.scores]
     against = [others] * bool(others) + [f"black box {percent(reached)}" for reached in sorted(base)[:1]]
     head = f"{best} predicts it." if len(worst) == 1 else f"{best} predicts best."
+    if worst[best] <= 0:  # no better than its mean
+        head = f"{best} does not predict it." if len(worst) == 1 else f"None of them predicts, {best} least badly."
     text = f"{head} It explains {percent(worst[best])} of the worst signal"
     text += f" ({', '.join(against)})." if against else "."
     return f"{text} The black box does better on {', '.join(beaten)}." if beaten else text

@@ -74,8 +74,7 @@ def fit_figure(
         panels[0].set_title(_short(title, 70), parse_math=False)
     drawing.legend(
         *panels[0].get_legend_handles_labels(),
-        loc="lower left",
-        bbox_to_anchor=(0.85 / width, 0.0),
+        loc="outside lower left",
         ncols=4,
         columnspacing=1.0,
         borderpad=0,
@@ -83,8 +82,7 @@ def fit_figure(
     )
     panels[0].set_xlim(float(score.t[0]), float(score.t[-1]))
     hide_inner_times(panels)
-    for panel in panels:
-        panel.yaxis.set_label_coords(-0.62 / (width - 0.95), 0.5)
+    drawing.align_ylabels(panels)
     return drawing
 
 
