@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 
 from upright.errors import BadInput
 from upright.readers.inspection import Inspection, inspect_record
@@ -39,13 +38,10 @@ def read_source(source: Source, *, reader: str | None = None) -> Record:
     """Record of content already in memory; see `read`."""
     chosen = READERS.named(reader or reader_of(source))
     try:
-        record = chosen.read(source)
+        return chosen.read(source)
     except BadInput as error:
         where = "" if source.file in str(error) else f"'{source.file}': "  # the record refused what the reader found
         raise BadInput(" ".join((f"{where}{error}", *(() if reader else READERS.unsound())))) from None
-    if record.provenance.file is None:  # a record that was stored knows what made it, and not where it lies now
-        return record.replace(provenance=replace(record.provenance, file=source.file))
-    return record
 
 
 def reader_of(source: Source) -> str:

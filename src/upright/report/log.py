@@ -26,7 +26,7 @@ def chapter(record: Record, inspection: Inspection) -> Chapter:
         description="; ".join(f"{c.name} from {c.low:.5g} to {c.high:.5g}" for c in inspection.columns),
     )
     notes = (Points(tuple(f"Note: {note}" for note in inspection.notes)),) if inspection.notes else ()
-    name = f"{inspection.file} ({inspection.reader})"
+    name = f"{inspection.file} ({inspection.reader})" if inspection.file else f"A log of a {inspection.reader}"
     content = (Points(tuple(_time_lines(inspection))), _table(inspection), *notes, drawn)
     return Chapter(title=name, verdict="", parts=(Part(name, content),))
 
@@ -137,6 +137,8 @@ def draw_columns(record: Record, inspection: Inspection) -> Figure:
     drawing.align_ylabels(panels)
     state = "grey: at rest" if moving else "nothing moves"
     drawing.suptitle(
-        f"{Path(inspection.file).name}, {inspection.time.samples} samples, {state}", fontsize=10, parse_math=False
+        ", ".join(filter(None, (Path(inspection.file).name, f"{inspection.time.samples} samples", state))),
+        fontsize=10,
+        parse_math=False,
     )
     return drawing
