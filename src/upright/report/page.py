@@ -87,7 +87,7 @@ class Table:
     anchors: tuple[str, ...] = ()
 
 
-LARGEST_NARROW = 75_000
+LARGEST_NARROW = 40_000
 """Bytes of a drawing that is laid out for a phone too; a page is mailed, and a second layout is a second drawing."""
 
 
@@ -158,7 +158,7 @@ class Picture:
 
         wide, drawn = len(self.svg), self._drawn
         del self.__dict__["_drawn"]
-        if wide > 10 * LARGEST_NARROW or not narrowed(drawn):
+        if wide > 2 * LARGEST_NARROW or not narrowed(drawn):
             return ""
         text = svg(drawn, f"{self.name}-narrow")
         return text if len(text) < LARGEST_NARROW else ""
