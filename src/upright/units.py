@@ -124,8 +124,8 @@ def same_dimension(unit: str, other: str) -> bool:
 
 def denominator(unit: str) -> str:
     """What a gain is per, "" where it is per nothing: V of ``N m/V``, m/s^2 of ``N/(m/s^2)``."""
-    inner = unit.rstrip()
-    return inner[:-1].rpartition("/(")[2] if inner.endswith(")") else inner.rpartition("/")[2] if "/" in inner else ""
+    _, slash, below = unit.rstrip().rpartition("/(" if unit.rstrip().endswith(")") else "/")
+    return below.removesuffix(")") if slash else ""
 
 
 def is_acceleration(unit: str) -> bool:

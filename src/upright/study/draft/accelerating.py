@@ -41,9 +41,11 @@ def acceleration_command(
         return None
     place = columns[body.name]
     scale = {**ANGLES, **LENGTHS}.get(place.guess)
+    if scale is None:
+        return None
     taken = {c.name for c in columns.values()}
     for c in inspection.columns:
-        if scale is None or c.name in taken or c.constant or not _NAMED.search(c.name):
+        if c.name in taken or c.constant or not _NAMED.search(c.name):
             continue
         share, per = _followed(record.t, record[c.name], scale * record[place.name])
         near = [u for u in _units_of(c, body.unit) if abs(abs(per) / units.scale(u) - 1) < EXACT]
