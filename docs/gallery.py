@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import os
 import tomllib
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
 from html import escape
+from multiprocessing import get_context
 from pathlib import Path
 
 import upright as up
@@ -22,13 +25,16 @@ def write(pages: Path, files: Path, *, quick: bool = False) -> None:
     for folder in (pages, files):
         folder.mkdir(parents=True, exist_ok=True)
     data = "" if quick else os.environ.get("UPRIGHT_REAL_DATA", "")
-    texts = {name: _live(name, title, files) for name, title in LIVE.items()}
-    if not quick:
-        texts["laboratory"] = _laboratory(files)
-    public = {path.stem: _study(path, data, files) for path in sorted(STUDIES.glob("*.toml"))}
-    for name, text in {**texts, **public}.items():
-        (pages / f"{name}.md").write_text(text, encoding="utf-8")
-    index = [_INDEX, _toctree("Simulated rigs", texts), _toctree("Public rigs", public)]
+    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+        public = {
+            p.stem: pool.submit(_study, p, data, files) for p in sorted(STUDIES.glob("*.toml"))
+        }
+        simulated = {name: pool.submit(_live, name, title, files) for name, title in LIVE.items()}
+        if not quick:
+            simulated["laboratory"] = pool.submit(_laboratory, files)
+        for name, text in {**simulated, **public}.items():
+            (pages / f"{name}.md").write_text(text.result(), encoding="utf-8")
+    index = [_INDEX, _toctree("Simulated rigs", simulated), _toctree("Public rigs", public)]
     (pages / "index.md").write_text("\n".join(index), encoding="utf-8")
 
 
@@ -38,7 +44,7 @@ Every page here was made by the build: the studies in `examples/studies/` were i
 """
 
 
-def _toctree(title: str, names: dict[str, str]) -> str:
+def _toctree(title: str, names: Iterable[str]) -> str:
     return f"## {title}\n\n```{{toctree}}\n:maxdepth: 1\n\n" + "\n".join(names) + "\n```\n"
 
 

@@ -51,19 +51,20 @@ def server(tmp_path):
     (tmp_path / "server.py").write_text(SERVER, encoding="utf-8")
     process = subprocess.Popen(
         [sys.executable, str(tmp_path / "server.py"), str(tmp_path)], env=ours(), cwd=ROOT, stdout=subprocess.PIPE,
-        text=True,
+        text=True, preexec_fn=_hears,
     )  # fmt: skip
     process.url = process.stdout.readline().strip()
     yield process, tmp_path / "out"
     process.send_signal(signal.SIGCONT)
     process.kill()
     if not process.stdout.closed:
-        process.communicate()  # ends with the last process that holds its output, which is the loop's
+        process.communicate(timeout=240)  # ends with the last process that holds its output, which is the loop's
 
 
 def _hears() -> None:
-    """Ctrl-C, also where these tests run in a shell's background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """Ctrl-C and a terminal that closes, also where these tests run in a shell's background or under nohup."""
+    for each in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(each, signal.SIG_DFL)
 
 
 @contextmanager
@@ -90,7 +91,7 @@ def test_a_server_that_is_killed_at_any_instant_of_the_start_leaves_the_drive_of
         state_of(socket, "starting")
         threading.Event().wait(after)
         process.kill()
-        process.communicate()  # the loop's process has ended too
+        process.communicate(timeout=240)  # the loop's process has ended too
     command, enabled, _, driven = put_out(out)
     assert (command, enabled) == (0.0, 0)
     assert driven <= 1  # the tick that was on its way
@@ -103,7 +104,7 @@ def test_a_drive_that_is_on_goes_off_with_the_server(server, name):
         state_of(socket, "running")
         assert until(lambda: put_out(out)[1] == 1)
         process.send_signal(getattr(signal, name))
-        process.communicate()
+        process.communicate(timeout=240)
     assert put_out(out)[:2] == (0.0, 0)
 
 
@@ -136,7 +137,7 @@ def test_an_operator_whose_page_is_killed_is_missed_after_ten_seconds(server):
     assert page.stdout.readline() == b"running\n"
     with connect(process.url.replace("http", "ws", 1) + "live/furuta") as watcher:
         page.kill()
-        page.communicate()
+        page.communicate(timeout=240)
         assert put_out(out)[1] == 1
         assert "gone" in state_of(watcher, "stopped")["why"]
         assert until(lambda: put_out(out)[:2] == (0.0, 0), 5.0)
@@ -246,7 +247,7 @@ def test_ctrl_c_on_the_whole_group_ends_the_bench_in_order_and_prints_no_traceba
             _, errors = process.communicate(timeout=240)
     finally:
         process.kill()
-        process.communicate()
+        process.communicate(timeout=240)
     assert errors == ""
     assert process.returncode == 0
     assert put_out(tmp_path / "out")[:2] == (0.0, 0)

@@ -36,7 +36,7 @@ def test_a_cortex_m3_answers_in_qemu(built):
         rig.close()
     finally:
         qemu.terminate()
-        qemu.communicate()
+        qemu.communicate(timeout=60)
 
 
 def test_a_fuzzer_finds_nothing_that_breaks_it(built):

@@ -81,8 +81,9 @@ def order(folder, **more):
 
 
 def ours():
-    """Environment of a program that sees the tests as this one does."""
-    return os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
+    """Environment of a program that sees the tests as this one does, and prints only what it says itself."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONWARNDEFAULTENCODING"}
+    return kept | {"PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, sys.path)])}
 
 
 def until(done, seconds=30.0):
@@ -243,7 +244,7 @@ def orphaned(folder, event):
         [sys.executable, str(folder / "doomed.py"), str(folder), event], env=ours(), cwd=ROOT, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
     )  # fmt: skip
-    said, _ = parent.communicate()  # ends with the last process that holds the other end
+    said, _ = parent.communicate(timeout=240)  # ends with the last process that holds the other end
     assert parent.returncode == -signal.SIGKILL, said
     return put_out(folder / "out")
 

@@ -85,6 +85,8 @@ def application(stations: Sequence[Station]) -> Starlette:
         try:
             return Response(await asyncio.shield(scripts[name]), media_type=SCRIPT)
         except UprightError as error:
+            if not isinstance(error, BadInput):  # its process was killed, say: the next one may fare better
+                scripts.pop(name, None)
             return PlainTextResponse(str(error), status_code=404)
         finally:  # somebody has opened the rig; one after the other, since processors are few
             hubs[name].station.prepare()

@@ -84,7 +84,7 @@ def in_own_process(task: Callable[..., str], *arguments: Any) -> str:
 
 def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, ...]) -> None:
     if hasattr(os, "nice"):
-        os.nice(10)  # what moves comes first
+        os.nice(5)  # what moves comes first, yet 10 leaves a tenth of a processor that a browser draws on
     try:
         pipe.send(task(*arguments))
     except UprightError as error:
