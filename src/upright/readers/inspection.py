@@ -22,10 +22,16 @@ from upright.signals.stretches import stretches
 
 _SHOWN = 12  # switches, gaps and rests beyond these tell nothing new
 # What names have in common, in the logs of many laboratories.
-_ANGLE = re.compile(r"theta|phi|psi|alpha|beta|angle|arm|joint.*position|pend", re.IGNORECASE)
+_ANGLE = re.compile(r"theta|phi|psi|alpha|beta|angle|arm|joint.*position|pend|(?<![a-z])pole(?![a-z])", re.IGNORECASE)
 _RATE = re.compile(r"velocity|speed|rate|_dot|omega|qd", re.IGNORECASE)
 _COUNTS = re.compile(r"enc|count|cart\d*pos|\bpos\b", re.IGNORECASE)
 _LENGTH = re.compile(r"^(z|x|pos(ition)?|distance|displacement|cart|carriage)\d*$", re.IGNORECASE)
+# cart_position, trolley.x, and the joint slider_to_cart of a robot's description
+_SLIDES = re.compile(
+    r"(?:^|[^a-z0-9])(?:cart|carriage|trolley|slider)[^a-z0-9]*(?:x|pos(?:ition)?|displacement)?$", re.IGNORECASE
+)
+_FARTHEST = 10.0
+"""What is called a cart and goes farther than this is not in metres."""
 _PLACE = re.compile(r"(?P<stem>.+)_(?P<unit>rad|deg|m|cm|mm)", re.IGNORECASE)
 _LASTS = re.compile(r".+_(?P<unit>us|ms|ns)|(?P<bare>dt|latency|jitter)", re.IGNORECASE)
 _SUPPLY = re.compile(r"batt|supply|v_?(cc|dd|bus|bat|in)\b", re.IGNORECASE)
@@ -201,6 +207,8 @@ def _guess_unit(name: str, values: Array, step: Resolution) -> str:
         return unit
     if whole and (np.ptp(values) >= 20 or _COUNTS.search(name)):
         return "counts"
+    if _SLIDES.search(name):
+        return "m" if float(np.abs(values).max()) < _FARTHEST else ""
     if step.counts_per_rev:
         return "rad"
     if _ANGLE.search(name) and float(np.abs(values).max()) < 2000 and "effort" not in name:
