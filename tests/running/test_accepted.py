@@ -85,6 +85,10 @@ def test_a_drive_that_commands_an_acceleration_gets_no_pulse(bench):
         up.run("RIG.toml", excite="step 1", out="runs")
     with pytest.raises(BadInput, match=r"commanded by its acceleration.*pulse=False"):
         up.rig_doctor("RIG.toml")
+    twin = SERIAL.replace('kind = "serial"\nport = "/dev/no_such_board"', 'kind = "twin"').replace("5 V", "50 rad/s^2")
+    Path("TWIN.toml").write_text(twin, encoding="utf-8")
+    with pytest.raises(BadInput, match=r"commanded by its acceleration.*pulse=False"):
+        up.rig_doctor("TWIN.toml")
     with pytest.raises(BadInput, match="no_such_board"):  # as far as the wire
         up.run("RIG.toml", excite="step 1", out="runs", check=False)
 

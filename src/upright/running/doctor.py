@@ -91,7 +91,7 @@ def check_up(
     """
     file = read_rig_file(path)
     model, _ = model_and_truth(file)
-    if file.hardware and pulse and is_acceleration(model.unit):
+    if pulse and is_acceleration(model.unit):  # of a twin too: it rehearses what the rig will be asked
         raise BadInput(
             f"the drive of {path} is commanded by its acceleration, so that the pulses of the doctor would leave it "
             "moving; look at the rest with --no-pulse."
