@@ -58,7 +58,7 @@ def held(seconds: float, memory: float, seed: int) -> list[bool]:
 def run(*, quick: bool, progress: Callable[[str], None], workers: Workers = HERE) -> list[Line]:
     """Share of intervals that hold the truth, by length of the record and memory of its noise."""
     lines: list[Line] = []
-    seeds = range(10 if quick else 200)
+    seeds = range(4 if quick else 200)
     for seconds in SECONDS:
         for memory in MEMORY:
             name = f"{seconds:g} s, autocorrelation {memory:g}"

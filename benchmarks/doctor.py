@@ -16,7 +16,7 @@ from pathlib import Path
 from benchmarks.doctored import FAULTS, PLANTS, batch
 from benchmarks.measure import Line
 
-EACH, QUICK = 100, 3
+EACH, QUICK = 100, 1
 """Records per plant and fault."""
 SEED = 2026
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "howto" / "doctor.md"

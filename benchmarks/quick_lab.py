@@ -27,7 +27,7 @@ from upright.logs import read_log
 from upright.workers import HERE, Workers
 
 MAKES = {"furuta": ("psi", "theta"), "linear": ("x", "theta")}
-TWINS, QUICK = 100, 4
+TWINS, QUICK = 100, 2
 LEAST = 95
 COUNTED = (0.25, 0.5, 2000 / 4096, 1024 / 1000, 2.0, 4.0)
 """Counts over those described: edges counted otherwise, another disk."""

@@ -348,7 +348,7 @@ def run(
     """Lines of each rig, of each fault, and of frames."""
     lines: list[Line] = []
     every: list[Outcome] = []
-    seconds, each, frames = (40.0, 1, 20_000) if quick else (SESSION, 12, 1_000_000)
+    seconds, each, frames = (10.0, 1, 5_000) if quick else (SESSION, 12, 1_000_000)
     for kind in KINDS:
         progress(f"{each} sessions of {seconds:g} s on twins like {kind}")
         done, _ = of_each(session, [(kind, k, seconds) for k in range(each)], workers)

@@ -27,9 +27,9 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     lines: list[Line] = []
     for make in PENDULUMS:
         progress(f"{make}, up")
-        lines += [_up(make, 8 if quick else 100, far) for far in (1.0, 3.0)]
+        lines += [_up(make, 3 if quick else 100, far) for far in (1.0, 3.0)]
         progress(f"{make}, encoders")
-        lines += _sensors(make, 12 if quick else 200)
+        lines += _sensors(make, 4 if quick else 200)
     return lines
 
 

@@ -22,7 +22,7 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     from upright.rig.makes import SHAFTS, make_rig
 
     lines: list[Line] = []
-    seeds = range(1, 5 if quick else 101)
+    seeds = range(1, 3 if quick else 101)
     for kind in SHAFTS:
         progress(kind)
         with tempfile.TemporaryDirectory() as folder:
