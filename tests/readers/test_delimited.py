@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+
 import numpy as np
 import pytest
 
@@ -189,3 +192,17 @@ def test_a_first_column_of_another_name_counts_in_the_unit_that_it_states() -> N
     seen = record("Stempel [ms],x\n0,1\n5,2\n10,3\n")
     np.testing.assert_allclose(seen.t, [0, 5e-3, 10e-3])
     assert not any("named like a time" in note for note in seen.provenance.notes)
+
+
+@pytest.mark.parametrize(("delimiter", "mark"), [(",", "."), (";", ","), (",", ","), ("\t", ".")])
+def test_numbers_in_quotation_marks_are_those_that_were_written(delimiter, mark):
+    rows = [(k / 64, -1.5 * k / 1024, 17.25 + k) for k in range(30)]
+    written = io.StringIO()
+    out = csv.writer(written, delimiter=delimiter, quoting=csv.QUOTE_ALL)
+    out.writerows([("t", "theta", "x"), *((f"{v:.12g}".replace(".", mark) for v in row) for row in rows)])
+    seen = record(written.getvalue())
+    assert np.array_equal(np.c_[seen.t, seen["theta"], seen["x"]], rows)
+
+
+def test_a_comma_in_quotation_marks_that_may_part_thousands_is_refused():
+    assert "3 columns below, got 2" in refusal('t,x\n0,"1,234"\n1,"1,235"\n2,"1,236"\n')

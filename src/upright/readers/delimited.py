@@ -25,6 +25,7 @@ from upright.records.record import CSV_MARK
 from upright.units import converted
 
 _FIRST = 200  # lines that names and remarks may take
+_QUOTED = re.compile(r'"[ \t]*([+-]?)(\d*)([.,]?)(\d*)((?:[eE][+-]?\d+)?)[ \t]*"')
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
 
@@ -36,7 +37,7 @@ def layout(source: Source, text: str | None = None) -> TextTable:
     BadInput
         When no line begins with a number, or a name stands above two columns.
     """
-    given = source.text if text is None else text
+    given = _unquoted(source.text if text is None else text)
     sent, arrival = without_arrival(given)
     stamped, began = in_seconds(sent)
     text, labels = bare_rows(stamped)
@@ -86,6 +87,21 @@ def layout(source: Source, text: str | None = None) -> TextTable:
         began=began,
         arrival=arrival,
     )
+
+
+def _unquoted(text: str) -> str:
+    """The text with its numbers out of quotation marks; a comma in one of them is read where it parts no thousands."""
+    if '"' not in text:
+        return text
+    fractions = any(len(m[4]) != 3 or m[2] in ("", "0") for m in _QUOTED.finditer(text) if m[3] == ",")
+
+    def bare(cell: re.Match[str]) -> str:
+        sign, whole, mark, fraction, power = cell.groups()
+        if not whole + fraction or (mark == "," and not fractions):
+            return cell[0]
+        return f"{sign}{whole}{mark and '.'}{fraction}{power}"
+
+    return _QUOTED.sub(bare, text)
 
 
 def _names(above: Sequence[str], row: str, delimiter: str | None, labels: Sequence[Label]) -> list[str]:
