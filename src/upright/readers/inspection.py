@@ -235,9 +235,14 @@ def effort_unit(name: str) -> str:
     return unit if known and any(units.same_dimension(unit, effort) for effort in EFFORTS) else ""
 
 
+def is_supply(name: str) -> bool:
+    """Whether a column is called like the voltage of a battery or a power supply."""
+    return _SUPPLY.search(name) is not None
+
+
 def _is_drive(name: str, values: Array, unit: str) -> bool:
     """Whether a column drives rather than is measured: by name, or because it moves in a few steps only."""
-    if _SUPPLY.search(name):
+    if is_supply(name):
         return False
     if _DRIVE.search(name) or effort_unit(name):
         return True

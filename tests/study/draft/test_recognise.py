@@ -248,6 +248,26 @@ def test_the_command_is_what_is_called_so_before_what_only_looks_so():
     assert name(log(voltage=wobble, push=0 * T, inputs=("push",))) == "voltage"
 
 
+def test_the_only_column_in_volts_beside_places_is_the_command_whatever_its_language():
+    wobble, speed = SWING * OTHER, np.gradient(SWING, T)
+
+    def name(place: str = "deg", **volts: Any) -> str | None:
+        signals = {"Winkel": SWING, **volts}
+        units = {**dict.fromkeys(volts, "V"), "Winkel": place}
+        record = Record(t=T, signals=signals, units=units)
+        found = drive_column(record, inspect(record))
+        return found.name if found else None
+
+    assert name(Tension=wobble) == "Tension"
+    assert name(Tension=wobble, Spannung=wobble**2) is None  # nobody knows which
+    assert name(Tension=speed) is None  # a tachometer
+    assert name(Pendel=wobble) is None  # a potentiometer
+    assert name(battery=wobble) is None
+    assert name(Tension=wobble, place="") is None  # both may be potentiometers
+    record = Record(t=T, signals={"Winkel": SWING, "Tension": wobble}, units={"Winkel": "deg", "Tension": "V"})
+    assert any("'Tension' is the only column in V" in doubt for doubt in recognise(record, inspect(record)).doubts)
+
+
 def test_columns_are_assigned_by_name_then_by_kind_then_by_order():
     two = {"pend": SWING, "arm": OTHER}
     record = log(**two)

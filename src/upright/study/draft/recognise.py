@@ -11,7 +11,7 @@ import numpy as np
 
 from upright.errors import BadInput
 from upright.physics import PLANTS, Plant, find
-from upright.readers.inspection import Column, Inspection, effort_unit
+from upright.readers.inspection import Column, Inspection, effort_unit, is_supply
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS, bare_name
 from upright.signals.regression import LeastSquares
@@ -19,6 +19,7 @@ from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.accelerating import acceleration_command
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.release import free_from, free_swings
+from upright.units import same_dimension
 
 RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)
 _EFFORT = re.compile(r"effort|volt|current|torque|force|plant_input|cmd|duty|^(u|v|i)$", re.IGNORECASE)
@@ -106,6 +107,8 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
             f"'{drive.name}' is the acceleration of '{body}': taken for the command of a drive that follows it "
             f"whatever hangs there, as a stepper does."
         )
+    elif drive is not None and not drive.drive:
+        doubts.append(f"'{drive.name}' is the only column in V or A beside what moves: taken for the command.")
     degrees = [c.name for c in columns.values() if c.guess == "deg" and inspection.column(c.name).guess == "rad"]
     doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
@@ -232,8 +235,8 @@ def in_dac_counts(c: Column) -> bool:
 def drive_column(record: Record, inspection: Inspection) -> Column | None:
     """What commands the rig.
 
-    That is the column in converter counts, else one called like an effort, else one that looks so; where the record
-    states an input, it is that.
+    That is the column in converter counts, else one called like an effort, else one that looks so, else the only one in
+    V or A beside places whose unit is known; where the record states an input, it is that.
     """
     dac = next((c for c in inspection.columns if in_dac_counts(c)), None)
     if dac is not None:
@@ -244,11 +247,21 @@ def drive_column(record: Record, inspection: Inspection) -> Column | None:
     ]
     candidates = [c for c in candidates if not REFERENCE.search(c.name)]
     effort = [c for c in candidates if _EFFORT.search(c.name) or effort_unit(c.name)]
-    drive = (effort or candidates or [None])[0]
+    drive = (effort or candidates or _of_its_unit(record, inspection) or [None])[0]
     stated = [inspection.column(name) for name in record.inputs]
     if not stated or (drive is not None and drive.name in record.inputs):
         return drive
     return drive if stated[0].constant else stated[0]
+
+
+def _of_its_unit(record: Record, inspection: Inspection) -> list[Column]:
+    """The only column in volts or amperes: no supply, no tachometer, no potentiometer of a body."""
+    places = [c.name for c in inspection.columns if c.unit in _SI and not c.constant]
+    electric = [c for c in inspection.columns if c.unit and any(same_dimension(c.unit, unit) for unit in ("V", "A"))]
+    body = any(pattern.search(c.name) for c in electric for pattern in (_TURNS, _PENDULUM, _CART, _DISK))
+    if len(electric) != 1 or not places or electric[0].constant or electric[0].remarks or body:
+        return []
+    return [] if is_supply(electric[0].name) or _is_speed(record, electric[0].name, places) else electric
 
 
 def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
