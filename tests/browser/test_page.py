@@ -276,6 +276,8 @@ def test_axe_finds_nothing_nothing_is_clipped_and_stop_lies_open(server, chromiu
                 violations += [(width, screen, v["id"], [n["html"][:100] for n in v["nodes"]]) for v in present]
                 assert one.page.evaluate("document.documentElement.scrollWidth") <= width
                 assert one.page.evaluate(COVERS) == []
+            name, stop = (one.page.locator(q).bounding_box() for q in ("#rig-name", "#stop"))
+            assert width < 700 or stop["y"] < name["y"] + name["height"], "STOP stands below the first row"
             assert one.wrong == []
             assert one.foreign(server) == []
     assert violations == []
