@@ -24,6 +24,15 @@ SMALL = """[...document.querySelectorAll('main *')].filter((e) =>
   && [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim())
   && parseFloat(getComputedStyle(e).fontSize) < 12.9).map((e) => e.outerHTML.slice(0, 120))"""
 
+SHEET = 680
+"""Width [px] of a sheet of A4 less its margins of 15 mm, 180 mm at 96 px per inch."""
+MARRED = """[...document.querySelectorAll('main *')].filter((e) => !e.closest('svg') && e.checkVisibility() && (
+  e.getBoundingClientRect().right > innerWidth + 0.5
+  || (e.matches('section') && [...e.children].filter((c) => c.checkVisibility()).length < 2)
+  || (!e.closest('math, sub, sup') && parseFloat(getComputedStyle(e).fontSize) < 10.6)
+)).map((e) => e.outerHTML.slice(0, 120))"""
+"""What runs over a sheet, a heading of nothing, letters below 8 pt."""
+
 
 @pytest.fixture(scope="module", params=[*QUICK, *SLOW, "book"])
 def written(request, tmp_path_factory):
@@ -76,3 +85,10 @@ def test_paper_opens_what_a_screen_folds_and_a_verdict_takes_at_most_120_words(w
                 " return c.textContent.split(/\\s+/).filter(Boolean).length }"
             )
             assert words <= 120
+
+
+def test_on_paper_nothing_runs_over_the_sheet_stands_bare_or_is_below_8_pt(written):
+    with opened(written[0], width=SHEET) as (page, _):
+        page.emulate_media(media="print")
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert page.evaluate(MARRED) == []
