@@ -64,6 +64,17 @@ def test_what_is_packed_is_the_run_to_sixteen_bits_of_each_line(uniform):
     assert np.isnan(left[17])
 
 
+def test_a_band_without_bound_is_still_seen_where_it_is_narrow():
+    """One of 1e5 rad at the end took all 16 bits, and looked like none where it was half a degree."""
+    t = 1e-3 * np.arange(900)
+    y = np.sin(5 * t)
+    band = 0.01 * np.exp(18 * t)
+    panel = TracePanel(name="θ", unit="rad", measured=y, models={"model": y + 0.1}, bands={"model": band})
+    shown = values(json.loads(traces(t, [panel], name="run"))["panels"][0]["models"][0]["band"])
+    np.testing.assert_allclose(shown[band < 1], band[band < 1], rtol=0.05)
+    assert np.all(y + 0.1 + shown[-1] > y.max())
+
+
 def test_a_million_samples_take_the_room_they_are_given():
     t = np.arange(1_000_000) * 1e-3
     panels = [TracePanel(name=n, unit="rad", measured=np.sin(t * (k + 1)), models={"model": np.sin(t * (k + 1)) + 1e-3})

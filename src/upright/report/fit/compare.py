@@ -220,7 +220,12 @@ def _cell(e: Estimate | None) -> str:
 
 
 def _picture(compared: Comparison, name: str, label: str, run: ComparedRun) -> Picture:
-    fitted = f" Fitted by {', '.join(run.fitted_by)}." if run.fitted_by else ""
+    more = (
+        " Grey, on a screen: bands that should hold 90 % of the samples."
+        if any(s.band for s in run.scores.values())
+        else ""
+    )
+    more += f" Fitted by {', '.join(run.fitted_by)}." if run.fitted_by else ""
     worst = ", ".join(f"{who} {percent(run.worst(who))}" for who in run.scores)
     return Picture(
         name=name,
@@ -229,7 +234,7 @@ def _picture(compared: Comparison, name: str, label: str, run: ComparedRun) -> P
             run.scores, compared.plant, name=label, room=ROOM // max(len(compared.runs), 1)
         ),
         caption=f"Run '{label}'. Wide light line: measured; others: predictions; below each signal, what is left over."
-        f"{fitted}",
+        f"{more}",
         description=f"Measured and predicted signals; of the worst signal are predicted: {worst}.",
     )
 

@@ -19,6 +19,8 @@ LEAST = 200
 """Samples of a run that a page holds, however many runs share it."""
 ROOM = 160_000
 """Characters that all traces of a fit take in its page."""
+BEYOND = 8.0
+"""Ranges of what was measured that a band goes beyond it: past any picture, yet fine in 16 bits where it is narrow."""
 _LEVELS = 32767  # 16 bits for each value, over the range of its own line; -32768 is no value
 
 
@@ -127,15 +129,23 @@ def _times(t: Array, rows: NDArray[np.int64]) -> dict[str, object]:
 def _panel(panel: TracePanel, rows: NDArray[np.int64]) -> dict[str, object]:
     measured = panel.measured
     models = {n: packed((m if measured is None else measured - m)[rows]) for n, m in panel.models.items()}
+    bands = {
+        n: b if measured is None else np.minimum(b, np.abs(measured - panel.models[n]) + BEYOND * _range(measured))
+        for n, b in panel.bands.items()
+    }
     return {
         "name": panel.name, "unit": panel.unit, "colour": panel.colour,
         "measured": None if measured is None else packed(measured[rows]),
         "models": [
-            {"name": n, "values": values, "band": packed(panel.bands[n][rows]) if n in panel.bands else None}
+            {"name": n, "values": values, "band": packed(bands[n][rows]) if n in bands else None}
             for n, values in models.items()
         ],
         "guess": None if panel.guess is None else packed(panel.guess[rows]),
     }  # fmt: skip
+
+
+def _range(values: Array) -> float:
+    return float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else np.inf
 
 
 def packed(values: Array) -> dict[str, object]:
