@@ -317,7 +317,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
         score_from=_score_from(run, grid),
         loop=loop,
         repeats=run.text_of("repeats", "step 0.5 V") if "repeats" in run else None,
-        source="; ".join(notes),
+        source="; ".join(filter(None, notes)),
         record=whole,
     )
 
