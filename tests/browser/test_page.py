@@ -24,6 +24,10 @@ COVERS = """() => { const box = document.getElementById('stop').getBoundingClien
     .filter((e) => !e?.closest('#stop')).map((e) => e?.outerHTML.slice(0, 100) ?? 'outside') }"""
 """What lies over a place of the button STOP."""
 
+SPILLS = """[...document.querySelectorAll('#design:not([hidden]) > .panel')]
+  .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.innerText.slice(0, 60))"""
+"""Panels of the screen Design whose content lies over what is below them."""
+
 STANDS = """most => { const text = document.querySelectorAll('#readings dd')[1].textContent;
   return Math.abs(parseFloat(text.replace('\u2212', '-'))) < most * 180 / Math.PI }"""
 """Whether the page says that the pendulum is so far from upright at most."""
@@ -276,6 +280,7 @@ def test_axe_finds_nothing_nothing_is_clipped_and_stop_lies_open(server, chromiu
                 violations += [(width, screen, v["id"], [n["html"][:100] for n in v["nodes"]]) for v in present]
                 assert one.page.evaluate("document.documentElement.scrollWidth") <= width
                 assert one.page.evaluate(COVERS) == []
+                assert one.page.evaluate(SPILLS) == []
             name, stop = (one.page.locator(q).bounding_box() for q in ("#rig-name", "#stop"))
             assert width < 700 or stop["y"] < name["y"] + name["height"], "STOP stands below the first row"
             assert one.wrong == []
