@@ -10,7 +10,7 @@ import shutil
 import time
 from pathlib import Path
 
-from docs import gallery, reference
+from docs import dot_plots, gallery, reference
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -86,4 +86,6 @@ def _put(path: Path, target: Path) -> None:
         )
     else:
         text = text.replace("](../docs/", "](../").replace("](docs/", "](")
+    if path.parent == ROOT / "benchmarks":
+        text = dot_plots.with_picture(path.stem, text, target.parent / "pictures")
     target.write_text(text, encoding="utf-8")
