@@ -36,7 +36,9 @@ pytestmark = [
 ]
 
 
-@pytest.mark.parametrize("name", studies())
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.thorough) if n == "ecp205_spinup" else n for n in studies()]
+)
 def test_a_real_rig_is_explained_and_predicted(name):
     study = load_study(STUDIES / f"{name}.toml", data=DATA)
     fit = identify(study.model, study.runs)

@@ -273,6 +273,7 @@ def test_lanes_are_watched_as_loops_by_themselves():
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("make", MAKES)
 def test_sound_rigs_that_are_played_with_are_left_alone(make):
     """Six minutes of seeds that neither the bounds nor the benchmark have; python -m benchmarks false_stops is 10 h."""

@@ -19,6 +19,7 @@ def fewest(share: float, records: int) -> float:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_found_in_90_of_100_records(fault):
     records = [d for plant in PLANTS for d in batch(plant, fault, EACH, seed=77)]

@@ -136,6 +136,7 @@ def test_the_share_told_never_goes_back(bench, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_experiments_side_by_side_say_what_they_say_one_after_another(tmp_path):
     """Frequency response and free swing both stand on the weighing, neither on the other."""
     one = laboratory.run_laboratory(("1", "4"), "furuta", 0, tmp_path / "one")

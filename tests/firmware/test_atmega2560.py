@@ -33,7 +33,7 @@ def started(board, mode, law=None, limits=LIMITS):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", [Mode.MCU, Mode.HOST])
+@pytest.mark.parametrize("mode", [Mode.MCU, pytest.param(Mode.HOST, marks=pytest.mark.thorough)])
 def test_it_is_held_for_a_minute_through_kicks_without_a_lost_tick(avr, mode):
     board = avr(*UPRIGHT)
     rows, rig = held(board, mode, inverted(), 60.0, KICKS, lockstep=True)

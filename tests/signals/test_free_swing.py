@@ -67,6 +67,7 @@ def test_reading_the_decrement_as_viscous_would_be_wrong_where_friction_is_dry()
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_stated_errors_are_those_seen_over_repetitions():
     m, k, c, f, noise = 0.8, 390.0, 1.2, 0.2, 2e-4
     rows = []

@@ -107,7 +107,7 @@ def test_what_does_not_swing_is_told_what_else_identifies_it(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("live", [True, False])
+@pytest.mark.parametrize("live", [pytest.param(True, marks=pytest.mark.thorough), False])
 def test_a_twin_with_dry_friction_is_identified_on_either_stand(live, tmp_path):
     truth = make_rig("rectilinear", 3)
     text = 'kind = "twin"\nmake = "rectilinear"\nseed = 3\n'

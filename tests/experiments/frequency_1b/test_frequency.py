@@ -290,6 +290,7 @@ def test_design_reads_the_fit_with_its_uncertainty(furuta):
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_other_rigs_of_the_makes_are_known_as_well(tmp_path):
     """Six rigs here, 50 of each pendulum in `python -m benchmarks frequency`."""
     inside = []

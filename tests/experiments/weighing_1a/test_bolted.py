@@ -52,7 +52,7 @@ def made(folder, loadings=LOADINGS):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("guessed", [300.0, 120.0])
+@pytest.mark.parametrize("guessed", [300.0, pytest.param(120.0, marks=pytest.mark.thorough)])
 def test_a_cart_is_weighed_within_its_travel_whatever_was_guessed(tmp_path, guessed):
     """A guess of a softer spring asks for less; what the probe shows makes up for it."""
     rig = made(tmp_path, LOADINGS.replace("0.2 %", "0 %"))

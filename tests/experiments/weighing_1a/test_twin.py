@@ -15,6 +15,7 @@ KINDS = ("rectilinear", "torsional")
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", KINDS)
 def test_twins_are_weighed_within_one_percent(kind):
     """Twelve rigs here, a hundred in `python -m benchmarks loadings`."""
