@@ -80,12 +80,10 @@ def swung_up(rig, path):
 
 
 @contextmanager
-def station(rig, folder) -> Iterator[tuple[Station, ByHand, Clock]]:
+def station(rig, folder, report=lambda run, end, started: "the verdict") -> Iterator[tuple[Station, ByHand, Clock]]:
     """A rig whose runs are performed by hand, with an operator."""
     carry, clock = ByHand(), Clock()
-    made = Station(
-        rig, folder, carry=carry, report=lambda run, end, started: "the verdict", swing_up=swung_up, clock=clock
-    )
+    made = Station(rig, folder, carry=carry, report=report, swing_up=swung_up, clock=clock)
     made.lease.take("operator")
     yield made, carry, clock
     if not made.over:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.browser.runs import felt, hardware, settled, station, twin
+from tests.browser.runs import SOON, felt, hardware, settled, station, twin
 from upright.basis import NOT_TRUSTED, Basis
 from upright.browser.hanging import write_swing_up
 from upright.browser.lease import PATIENCE
@@ -50,6 +51,32 @@ def test_a_run_goes_from_idle_to_its_end_and_has_a_verdict(at_work):
     assert (made.state, made.why, made.verdict, made.last.late) == ("ended", "", "the verdict", 7)
     ask(made, "operator", "start")
     assert made.state == "starting"
+
+
+def test_a_verdict_that_comes_when_the_next_run_has_begun_is_not_taken_for_its_own(rig, tmp_path):
+    """The page of that run would not show its verdict, since it had one before it ended."""
+    first, second = threading.Event(), threading.Event()
+    turn = iter([(first, "of the first"), (second, "of the second")])
+
+    def report(run, end, started):
+        written, verdict = next(turn)
+        assert written.wait(SOON)
+        return verdict
+
+    with station(rig, tmp_path, report=report) as (made, carry, _):
+        ask(made, "operator", "start")
+        carry.go()
+        writing = made._thread
+        carry.end()
+        assert settled(made, lambda m: m.state == "ended")
+        ask(made, "operator", "start")
+        carry.go()
+        first.set()
+        writing.join(SOON)
+        assert (made.state, made.verdict) == ("running", "")
+        carry.end()
+        second.set()
+        assert settled(made, lambda m: m.verdict == "of the second")
 
 
 @pytest.mark.parametrize("when", ["idle", "starting", "running"])

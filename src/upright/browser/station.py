@@ -131,12 +131,14 @@ class Station:
             rig=self.rig.rig_path, law=self._swing_path if hanging else self.rig.law_path, seconds=seconds,
             tilt=0.0 if hanging else self._tilt(start), from_rest=hanging, accept=accept,
         )  # fmt: skip
-        self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
-        self.from_hanging = hanging  # before the desk, by which a new scene is made
-        self.last, self.desk, self.loop = RunState(phase="starting"), Desk(), None if hanging else self.rig.loop
-        self.state, self.over, self._ending = STARTING, False, False
+        desk = Desk()
+        with self._lock:
+            self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
+            self.from_hanging = hanging  # before the desk, by which a new scene is made
+            self.last, self.desk, self.loop = RunState(phase="starting"), desk, None if hanging else self.rig.loop
+            self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
-        self._thread = threading.Thread(target=self._run, args=(request, self.desk), name=self.rig.name, daemon=True)
+        self._thread = threading.Thread(target=self._run, args=(request, desk), name=self.rig.name, daemon=True)
         self._thread.start()
 
     def stop(self, why: str) -> None:
@@ -273,9 +275,12 @@ class Station:
         if end.stopped == BY_HAND:  # the loop does not know by whose
             end = replace(end, stopped=why or "Ended by its operator.")
         try:
-            self.verdict = self._report(run, end, started)
+            verdict = self._report(run, end, started)
         except UprightError as error:
-            self.verdict = f"There is no report: {error}"
+            verdict = f"There is no report: {error}"
+        with self._lock:
+            if self.desk is desk:  # a report takes seconds, in which the next run may have begun
+                self.verdict = verdict
 
     def _ended(self, why: str, end: RunEnd | None = None) -> str:
         with self._lock:
