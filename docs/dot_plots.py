@@ -14,16 +14,16 @@ _MARKS = "osD^"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
-    """Where in a row something stands: cell behind the row's name, pattern of the number, or of it and its range."""
+class Cell:
+    """Where in a row a number is: which cell after the name, and the pattern of the number, or of it and its range."""
 
-    cell: int = 0
+    at: int = 0
     pattern: str = _NUMBER
 
     def of(self, cells: Sequence[str]) -> list[tuple[float, float, float]]:
         """Every such number with the ends of its range, itself where it has none."""
-        found = re.finditer(self.pattern, cells[self.cell])
-        return [tuple(float(n) for n in (m.groups() * 3)[:3]) for m in found]
+        matches = re.finditer(self.pattern, cells[self.at])
+        return [tuple(float(n) for n in (m.groups() * 3)[:3]) for m in matches]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,11 +34,11 @@ class Shown:
     ----------
     label : str
         Axis, with its unit.
-    series : mapping of str to Told
+    series : mapping of str to Cell
         What is measured, by its name; the only one needs none.
-    asked : mapping of str to float or Told
-        What it is to be, the same for all rows or told in each.
-    of : Told or None
+    targets : mapping of str to float or Cell
+        What it is to be, the same for all rows or a number in each.
+    of : Cell or None
         All of which these are some, where a row counts: a share [%] is drawn.
     named : int
         Cells that make the name of a row.
@@ -47,104 +47,104 @@ class Shown:
     """
 
     label: str
-    series: Mapping[str, Told]
-    asked: Mapping[str, float | Told] = field(default_factory=dict)
-    of: Told | None = None
+    series: Mapping[str, Cell]
+    targets: Mapping[str, float | Cell] = field(default_factory=dict)
+    of: Cell | None = None
     named: int = 1
     log: bool = False
 
 
 HELD = Shown(
     label="95 % intervals that hold the truth [%]",
-    series={"": Told(pattern=rf"{_NUMBER} % of \d+ intervals")},
-    asked={"promised": 95.0},
+    series={"": Cell(pattern=rf"{_NUMBER} % of \d+ intervals")},
+    targets={"nominal": 95.0},
 )
 SHOWN: Mapping[str, Shown] = {
     "agree": Shown(
         label="pairs of halves that agree within their intervals [%]",
-        series={"": Told(pattern=rf"{_NUMBER} %; median")},
+        series={"": Cell(pattern=rf"{_NUMBER} %; median")},
     ),
     "bands": Shown(
         label="unseen samples inside 90 % bands [%]",
-        series={"": Told(pattern=rf"{_NUMBER} % inside")},
-        asked={"promised": 90.0},
+        series={"": Cell(pattern=rf"{_NUMBER} % inside")},
+        targets={"nominal": 90.0},
     ),
     "dying": Shown(
         label="command on after the death [ms]",
-        series={"longest": Told()},
-        asked={"bound": Told(cell=1)},
+        series={"longest": Cell()},
+        targets={"bound": Cell(at=1)},
         named=2,
     ),
     "first": Shown(
         label="contacts that end with a trusted fit [%]",
-        series={"": Told(pattern=rf"{_NUMBER} trusted")},
-        of=Told(pattern=rf"{_NUMBER} contacts"),
+        series={"": Cell(pattern=rf"{_NUMBER} trusted")},
+        of=Cell(pattern=rf"{_NUMBER} contacts"),
     ),
     "gym": Shown(
         label="million steps a second, with quartiles",
-        series={"": Told(pattern=rf"{_NUMBER} \({_NUMBER} to {_NUMBER}\)")},
+        series={"": Cell(pattern=rf"{_NUMBER} \({_NUMBER} to {_NUMBER}\)")},
         log=True,
     ),
     "jitter": Shown(
         label="ticks late by [µs]",
-        series={"99 %": Told(cell=2), "99.9 %": Told(cell=3), "the latest": Told(cell=4)},
+        series={"99 %": Cell(at=2), "99.9 %": Cell(at=3), "the latest": Cell(at=4)},
         named=2,
         log=True,
     ),
     "kept": Shown(
         label="logs of which nine tenths of what moves are kept [%]",
-        series={"": Told(pattern=rf"\({_NUMBER} %\)")},
-        asked={"asked": 95.0},
+        series={"": Cell(pattern=rf"\({_NUMBER} %\)")},
+        targets={"target": 95.0},
     ),
     "misfit": HELD,
     "mutants": Shown(
         label="changes to the code that tests notice [%], with 95 % interval",
-        series={"": Told(pattern=rf"{_NUMBER} % \({_NUMBER} to {_NUMBER}\)")},
-        asked={"asked": 90.0},
+        series={"": Cell(pattern=rf"{_NUMBER} % \({_NUMBER} to {_NUMBER}\)")},
+        targets={"target": 90.0},
     ),
     "peers": Shown(
         label="of runs that no fit has seen, explained [%]",
-        series={"uw, tail": Told(), "aau, tail": Told(cell=1), "aau, restarted": Told(cell=2)},
+        series={"uw, tail": Cell(), "aau, tail": Cell(at=1), "aau, restarted": Cell(at=2)},
     ),
     "real": Shown(
         label="explained, run by run [%]",
-        series={"reached": Told(cell=1)},
-        asked={"asked": Told(cell=2)},
+        series={"reached": Cell(at=1)},
+        targets={"target": Cell(at=2)},
         named=2,
     ),
     "rigs": HELD,
     "safety": Shown(
         label="command zero after the fault [ms]",
-        series={"": Told(cell=1, pattern=rf"^{_NUMBER} ms")},
+        series={"": Cell(at=1, pattern=rf"^{_NUMBER} ms")},
         log=True,
     ),
     "soak": Shown(
         label="longest time from fault to stop [ms]",
-        series={"": Told(pattern=rf"at most {_NUMBER} ms later")},
+        series={"": Cell(pattern=rf"at most {_NUMBER} ms later")},
         log=True,
     ),
     "starts": Shown(
         label="starts that end at the lowest cost [%]",
-        series={"": Told(pattern=rf"\({_NUMBER} %; asked")},
-        asked={"asked": 95.0},
+        series={"": Cell(pattern=rf"\({_NUMBER} %; asked")},
+        targets={"target": 95.0},
     ),
     "strangers": Shown(
         label="runs held on a simulator that shares no code [%]",
-        series={"": Told(pattern=rf"times of 12, {_NUMBER} of")},
-        of=Told(pattern=rf"times of 12, \d+ of {_NUMBER} runs"),
+        series={"": Cell(pattern=rf"times of 12, {_NUMBER} of")},
+        of=Cell(pattern=rf"times of 12, \d+ of {_NUMBER} runs"),
     ),
     "verdicts": Shown(
         label="verdicts that were wrong [%]",
         series={
-            "“yes”": Told(pattern=rf"wrong yes {_NUMBER} %"),
-            "“no”": Told(pattern=rf"wrong no {_NUMBER} %"),
+            "“yes”": Cell(pattern=rf"wrong yes {_NUMBER} %"),
+            "“no”": Cell(pattern=rf"wrong no {_NUMBER} %"),
         },
-        asked={"“yes”, at most": 5.0, "“no”, at most": 15.0},
+        targets={"“yes”, at most": 5.0, "“no”, at most": 15.0},
     ),
     "workers": Shown(
         label="times as fast as one process",
-        series={"": Told(cell=1, pattern=rf"{_NUMBER} times as fast")},
-        asked={"asked": 1.8},
+        series={"": Cell(at=1, pattern=rf"{_NUMBER} times as fast")},
+        targets={"target": 1.8},
     ),
 }
 """What is drawn of the first table of each page; other pages have a picture already, or nothing that dots would show."""
@@ -152,11 +152,11 @@ SHOWN: Mapping[str, Shown] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What a row says: measured, with ranges, and asked."""
+    """What a row says: measured, with ranges, and targets."""
 
     name: str
     measured: Mapping[str, Sequence[tuple[float, float, float]]]
-    asked: Mapping[str, float]
+    targets: Mapping[str, float]
 
 
 def rows(page: str, shown: Shown) -> list[Row]:
@@ -168,39 +168,40 @@ def rows(page: str, shown: Shown) -> list[Row]:
     for line in lines[begin:end]:
         cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
         rest = cells[shown.named :]
-        measured = {name: told.of(rest) for name, told in shown.series.items()}
+        measured = {name: cell.of(rest) for name, cell in shown.series.items()}
         if shown.of is not None:
             most = shown.of.of(rest)
             measured = {
                 name: [tuple(100 * n / most[0][0] for n in each) for each in numbers if most]
                 for name, numbers in measured.items()
             }
-        asked = {
-            name: told.of(rest)[0][0] if isinstance(told, Told) else told
-            for name, told in shown.asked.items()
-            if not isinstance(told, Told) or told.of(rest)
-        }
+        targets: dict[str, float] = {}
+        for name, target in shown.targets.items():
+            numbers = target.of(rest) if isinstance(target, Cell) else [(target, target, target)]
+            targets |= {name: numbers[0][0]} if numbers else {}
         if any(measured.values()):
-            out.append(Row(name=", ".join(cells[: shown.named]), measured=measured, asked=asked))
+            out.append(
+                Row(name=", ".join(cells[: shown.named]), measured=measured, targets=targets)
+            )
     return out
 
 
 @styled
-def draw(told: Sequence[Row], shown: Shown, path: Path) -> None:
+def draw(table: Sequence[Row], shown: Shown, path: Path) -> None:
     """Write the picture of the rows of a table."""
-    drawing = figure(0.9 + 0.2 * len(told))
+    drawing = figure(0.9 + 0.2 * len(table))
     ax = drawing.subplots()
     for (name, _), (colour, _), mark in zip(shown.series.items(), CYCLE, _MARKS, strict=False):
-        dots = [(x, y) for y, row in enumerate(told) for x in row.measured[name]]
+        dots = [(x, y) for y, row in enumerate(table) for x in row.measured[name]]
         for (_, low, high), y in dots:
             ax.plot([low, high], [y, y], color=colour, linewidth=1.0)
         ax.plot(
             [x[0] for x, _ in dots], [y for _, y in dots], mark, color=colour, markersize=4.5, clip_on=False,
             label=name or "_",
         )  # fmt: skip
-    for (name, asked), (_, dashes) in zip(shown.asked.items(), CYCLE, strict=False):
-        if isinstance(asked, Told):
-            at = [(row.asked[name], y) for y, row in enumerate(told) if name in row.asked]
+    for (name, target), (_, dashes) in zip(shown.targets.items(), CYCLE, strict=False):
+        if isinstance(target, Cell):
+            at = [(row.targets[name], y) for y, row in enumerate(table) if name in row.targets]
             ax.plot(
                 [x for x, _ in at],
                 [y for _, y in at],
@@ -212,14 +213,14 @@ def draw(told: Sequence[Row], shown: Shown, path: Path) -> None:
             )
         else:
             ax.axvline(
-                asked, color=GREY, linewidth=1.2, linestyle=dashes, label=f"{name}: {asked:g}"
+                target, color=GREY, linewidth=1.2, linestyle=dashes, label=f"{name}: {target:g}"
             )
     ax.set_xlabel(shown.label)
-    ax.set_yticks(range(len(told)), [row.name for row in told])
-    ax.set_ylim(len(told) - 0.4, -0.6)
+    ax.set_yticks(range(len(table)), [row.name for row in table])
+    ax.set_ylim(len(table) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     if shown.log:
-        ax.set_xscale("symlog", linthresh=min(1.0, _least(told)))
+        ax.set_xscale("symlog", linthresh=min(1.0, _least(table)))
         ax.margins(x=0.03)
     ax.set_xlim(left=0)
     if ax.get_legend_handles_labels()[1]:
@@ -227,19 +228,19 @@ def draw(told: Sequence[Row], shown: Shown, path: Path) -> None:
     save(drawing, path)
 
 
-def _least(told: Sequence[Row]) -> float:
+def _least(table: Sequence[Row]) -> float:
     """The least number that is not 0: a logarithmic axis goes from there, and evenly down to 0."""
-    return min(x[0] for row in told for xs in row.measured.values() for x in xs if x[0] > 0)
+    return min(x[0] for row in table for xs in row.measured.values() for x in xs if x[0] > 0)
 
 
 def with_picture(name: str, page: str, folder: Path) -> str:
     """The page of a benchmark with a picture above its first table, written into a folder beside it."""
     shown = SHOWN.get(name)
-    told = [] if shown is None else rows(page, shown)
-    if shown is None or not told:
+    table = [] if shown is None else rows(page, shown)
+    if shown is None or not table:
         return page
     folder.mkdir(parents=True, exist_ok=True)
-    draw(told, shown, folder / f"{name}.svg")
-    head, above, table = re.split(r"(?m)^(\|.*\n\|[-:| ]+\|)$", page, maxsplit=1)
-    alt = f"Dots for {len(told)} rows of the table below: {shown.label}"
-    return f"{head}![{alt}]({folder.name}/{name}.svg)\n\n{above}{table}"
+    draw(table, shown, folder / f"{name}.svg")
+    before, head, after = re.split(r"(?m)^(\|.*\n\|[-:| ]+\|)$", page, maxsplit=1)
+    alt = f"Dots for {len(table)} rows of the table below: {shown.label}"
+    return f"{before}![{alt}]({folder.name}/{name}.svg)\n\n{head}{after}"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.dot_plots import SHOWN, Shown, Told, rows, with_picture
+from docs.dot_plots import SHOWN, Cell, Shown, rows, with_picture
 
 PAGES = Path(__file__).parent.parent / "benchmarks"
 PAGE = """# Kept
@@ -24,8 +24,8 @@ PAGE = """# Kept
 
 
 def test_a_dot_is_the_number_of_its_row_and_rows_without_one_have_none():
-    told = rows(PAGE, SHOWN["kept"])
-    assert [(row.name, row.measured[""]) for row in told] == [
+    drawn = rows(PAGE, SHOWN["kept"])
+    assert [(row.name, row.measured[""]) for row in drawn] == [
         ("all", [(99.0, 99.0, 99.0)]),
         ("driven", [(100.0, 100.0, 100.0)]),
     ]
@@ -34,15 +34,15 @@ def test_a_dot_is_the_number_of_its_row_and_rows_without_one_have_none():
 def test_numbers_of_several_cells_have_names_ranges_bounds_and_shares():
     shown = Shown(
         label="ms",
-        series={"most": Told(pattern=r"([\d.]+) \(([\d.]+) to ([\d.]+)\)"), "least": Told(cell=2)},
-        asked={"bound": Told(cell=1), "all": 5.0},
+        series={"most": Cell(pattern=r"([\d.]+) \(([\d.]+) to ([\d.]+)\)"), "least": Cell(at=2)},
+        targets={"bound": Cell(at=1), "all": 5.0},
         named=2,
     )
     (row,) = rows("| a | b | c | d | e |\n|--|--|--:|--:|:-:|\n| x | y | 3 (1 to 4.5) | 7 | 0.5 |\n", shown)
     assert row.name == "x, y"
     assert row.measured == {"most": [(3.0, 1.0, 4.5)], "least": [(0.5, 0.5, 0.5)]}
-    assert row.asked == {"bound": 7.0, "all": 5.0}
-    share = Shown(label="%", series={"": Told(pattern=r"(\d+) of")}, of=Told(pattern=r"of (\d+)"))
+    assert row.targets == {"bound": 7.0, "all": 5.0}
+    share = Shown(label="%", series={"": Cell(pattern=r"(\d+) of")}, of=Cell(pattern=r"of (\d+)"))
     (row,) = rows("| a | b |\n|--|--|\n| x | 3 of 4 |\n", share)
     assert row.measured[""] == [(75.0, 75.0, 75.0)]
 
@@ -54,7 +54,7 @@ def test_the_page_stays_as_it_is_but_for_the_picture_above_its_first_table(tmp_p
     assert page.index(picture) < page.index("| logs |")
     assert "2 rows" in picture
     drawn = (tmp_path / "pictures" / "kept.svg").read_text(encoding="utf-8")
-    assert all(name in drawn for name in ("driven", "asked: 95", "what moves are kept [%]"))
+    assert all(name in drawn for name in ("driven", "target: 95", "what moves are kept [%]"))
     assert with_picture("soak of another kind", PAGE, tmp_path) == PAGE
 
 
@@ -62,7 +62,7 @@ def test_the_page_stays_as_it_is_but_for_the_picture_above_its_first_table(tmp_p
 def test_every_page_that_is_to_have_a_picture_has_rows_for_it(name):
     """A table that is worded anew would lose its dots without a word."""
     page = (PAGES / f"{name}.md").read_text(encoding="utf-8")
-    told = rows(page, SHOWN[name])
+    drawn = rows(page, SHOWN[name])
     table = page[page.index("\n|") + 1 :].split("\n\n")[0].split("\n")[2:]
-    assert len(told) >= 0.35 * len([line for line in table if line.startswith("|")])
-    assert {s for row in told for s, numbers in row.measured.items() if numbers} == set(SHOWN[name].series)
+    assert len(drawn) >= 0.35 * len([line for line in table if line.startswith("|")])
+    assert {s for row in drawn for s, numbers in row.measured.items() if numbers} == set(SHOWN[name].series)

@@ -266,6 +266,8 @@ def test_the_only_column_in_volts_beside_places_is_the_command_whatever_its_lang
     assert name(Tension=wobble, place="") is None  # both may be potentiometers
     record = Record(t=T, signals={"Winkel": SWING, "Tension": wobble}, units={"Winkel": "deg", "Tension": "V"})
     assert any("'Tension' is the only column in V" in doubt for doubt in recognise(record, inspect(record)).doubts)
+    stated = Record(t=T, signals=record.signals, units=record.units, inputs=("Tension",))
+    assert not any("Tension" in doubt for doubt in recognise(stated, inspect(stated)).doubts)
 
 
 def test_columns_are_assigned_by_name_then_by_kind_then_by_order():

@@ -107,7 +107,7 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
             f"'{drive.name}' is the acceleration of '{body}': taken for the command of a drive that follows it "
             f"whatever hangs there, as a stepper does."
         )
-    elif drive is not None and not drive.drive:
+    elif drive is not None and not drive.drive and not record.inputs:
         doubts.append(f"'{drive.name}' is the only column in V or A beside what moves: taken for the command.")
     degrees = [c.name for c in columns.values() if c.guess == "deg" and inspection.column(c.name).guess == "rad"]
     doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
