@@ -159,7 +159,7 @@ def test_on_paper_it_says_the_same(book, tmp_path):
 def test_a_heading_over_pictures_alone_goes_where_they_float(tmp_path):
     pypdf = pytest.importorskip("pypdf")
     drawn = Picture(name="p", draw='<svg viewBox="0 0 9 9"></svg>', caption="Its caption.", description="nothing")
-    parts = (Part("Logged", (drawn,)), Part("Told", tuple(["A sentence."] * 40)), Part("Last", ("An end.",)))
+    parts = (Part("Logged", (drawn,)), Part("Discussed", tuple(["A sentence."] * 40)), Part("Last", ("An end.",)))
     path = pdf.write_pdf(tmp_path / "c.pdf", Chapter(title="A title", verdict="A verdict.", parts=parts))
     text = "".join(p.extract_text() for p in pypdf.PdfReader(path).pages)
     assert "Its caption." in text.split("Logged")[1].split("Told")[0].split("Last")[0]
