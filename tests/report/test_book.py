@@ -162,7 +162,7 @@ def test_a_heading_over_pictures_alone_goes_where_they_float(tmp_path):
     parts = (Part("Logged", (drawn,)), Part("Discussed", tuple(["A sentence."] * 40)), Part("Last", ("An end.",)))
     path = pdf.write_pdf(tmp_path / "c.pdf", Chapter(title="A title", verdict="A verdict.", parts=parts))
     text = "".join(p.extract_text() for p in pypdf.PdfReader(path).pages)
-    assert "Its caption." in text.split("Logged")[1].split("Told")[0].split("Last")[0]
+    assert "Its caption." in text.split("Logged")[1].split("Discussed")[0].split("Last")[0]
 
 
 def test_without_the_extra_there_is_no_pdf_but_a_way_out(book, tmp_path, monkeypatch):
