@@ -475,3 +475,28 @@ def test_a_record_of_ours_without_its_signals_is_a_log_like_any_other():
     found = record(t=T, x=X, upright="{}")
     assert found.provenance.reader == "matlab"
     assert found.names == ("x",)
+
+
+def captured(*signals: tuple[str, np.ndarray, str], axes: tuple[np.ndarray, ...], on: tuple[int, ...]) -> dict:
+    """What dSPACE's ControlDesk saves: a structure of X, the times, and Y, the signals."""
+    X = np.zeros((1, len(axes)), dtype=[("Name", "O"), ("Data", "O")])
+    for k, t in enumerate(axes):
+        X[0, k] = ("", t.reshape(1, -1))
+    Y = np.zeros((1, len(signals)), dtype=[("Name", "O"), ("Data", "O"), ("Unit", "O"), ("XIndex", "O")])
+    for k, (name, y, unit) in enumerate(signals):
+        Y[0, k] = (name, y.reshape(1, -1), unit, on[k])
+    return {"rec_001": {"X": X, "Y": Y, "Description": "", "RTProgram": "rig"}}
+
+
+def test_a_capture_of_dspace_has_its_signals_on_its_longest_time():
+    t = 0.001 * np.arange(50)
+    y, u, slow = np.cos(t), np.sin(t), np.ones(25)
+    read = record(**captured(
+        ("Model Root/Enc1/theta", y, "rad"), ("Model Root/Enc2/theta", 2 * y, ""),
+        ('"Model Root"\n"Motor"\n"u"', u, "V"), ("Model Root/T", slow, ""), axes=(t, t[::2]), on=(1, 1, 1, 2),
+    ))  # fmt: skip
+    assert dict(read.units) == {"Enc1/theta (rad)": "rad", "Enc2/theta": "", "u (V)": "V"}
+    np.testing.assert_allclose(read.t, t, atol=1e-12)
+    for name, values in {"Enc1/theta (rad)": y, "Enc2/theta": 2 * y, "u (V)": u}.items():
+        np.testing.assert_array_equal(read[name], values)
+    assert "Signal 'T' left out: its time differs." in read.provenance.notes

@@ -78,7 +78,8 @@ def _jumped(case: Case, c: Column, x: Array, jumped: Jumps) -> Iterator[Finding]
             sentence=f"'{c.name}' wraps {jumped.wraps.size} time{'s' if jumped.wraps.size > 1 else ''}: its counter"
             f" jumps by {jumped.modulus:.6g} {unit} (first at {t[jumped.wraps[0]]:.5g} s) while the body goes on.",
             evidence={f"turn [{unit}]": jumped.modulus, "wraps [1]": float(jumped.wraps.size)},
-            advice="Angles in rad are unwrapped when a study is read; unwrap counts before that.",
+            advice="Counters of 8, 16 or 32 bits are counted on when a log is read, angles in rad when a study is; "
+            "unwrap other columns before that.",
             key=f'[sensors.{case.coordinate(c.name)}]\nunit = "rad"' if unit == "rad" else "",
             panels=(*case.over_time(c.name), case.near(c.name, int(jumped.wraps[0]))),
             marks=tuple(float(t[i]) for i in jumped.wraps[:20]),

@@ -41,7 +41,7 @@ from upright.identification.model.fit import Assumption, Estimate, Fit, Pole, Ru
 from upright.identification.model.grey_box import GreyBox, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import correlation
-from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
+from upright.identification.problem.residuals import Problem, formulate, idle, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import Moments, unasked_trips, with_trip_guesses
 from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
@@ -206,8 +206,9 @@ def find_optimum(
     end = reached_limits(problem, end, log)
     log.unresolved = () if end.interrupted else unresolved(problem, end.x)
     log.unreached = () if end.interrupted else unreached(problem, end.x)
-    if log.unresolved or log.unreached:  # kept at their bound they would bias everything else, or what is predicted
-        whole = formulate(problem.rig.without((*log.unresolved, *log.unreached)), runs)
+    log.idle = {} if end.interrupted else idle(problem, end.x)
+    if left := (*log.unresolved, *log.unreached, *log.idle):  # they would bias everything else, or what is predicted
+        whole = formulate(problem.rig.without(left), runs)
         whole.weigh_like(problem)
         end = descend_progressively(whole, whole.place(problem.values_at(end.x)), log, horizon=math.inf)
         problem, end = whole, settle_weights(whole, end)
@@ -293,6 +294,8 @@ def _conclude(
             f"{name} was left out: no fitted run reaches it, so a run that goes further may be limited where this "
             "model says it is not."
             if name in log.unreached
+            else f"{name} was left out: how {log.idle[name]} acts makes no difference in these runs."
+            if name in log.idle
             else f"{name} was left out: shorter than the encoder's rounding, it is plain Coulomb friction."
             if name in log.unresolved
             else f"{name} was left out: with it the held-out part of the runs is not predicted better."

@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 from upright.errors import BadInput
 from upright.readers.inspection import Inspection, inspect_record
 from upright.readers.reader import READERS, Reader
 from upright.readers.source import Source, load
+from upright.readers.wrapped import unwrapped
 from upright.records import PathLike, Record
 
 __all__ = ["READERS", "inspect", "read", "reader_of"]
@@ -38,10 +40,24 @@ def read_source(source: Source, *, reader: str | None = None) -> Record:
     """Record of content already in memory; see `read`."""
     chosen = READERS.named(reader or reader_of(source))
     try:
-        return chosen.read(source)
+        return _unwrapped(chosen.read(source))
     except BadInput as error:
         where = "" if source.file in str(error) else f"'{source.file}': "  # the record refused what the reader found
         raise BadInput(" ".join((f"{where}{error}", *(() if reader else READERS.unsound())))) from None
+
+
+def _unwrapped(record: Record) -> Record:
+    """The record with every counter that passed its end counted on."""
+    signals, notes = dict(record.signals), list[str]()
+    for name, values in record.signals.items():
+        signals[name], bits, times = unwrapped(values)
+        if times:
+            passed = "once" if times == 1 else f"{times} times"
+            notes.append(f"'{name}' is a counter of {bits} bits and passed its end {passed}; it is counted on here.")
+    if not notes:
+        return record
+    origin = record.provenance
+    return record.replace(signals=signals, provenance=replace(origin, notes=(*origin.notes, *notes)))
 
 
 def reader_of(source: Source) -> str:

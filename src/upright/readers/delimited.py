@@ -137,7 +137,12 @@ def _first_lines(text: str) -> list[str]:
 
 def read(source: Source) -> Record:
     """Record of a table; time is the column named like it, else the first when it increases."""
-    text = layout(source)
+    return read_table(source)
+
+
+def read_table(source: Source, given: str | None = None) -> Record:
+    """The record that `read` makes; of a `given` text where the table stands otherwise in the file."""
+    text = layout(source, given)
     table = text.numbers()
     at, seconds = _time_column(text, table)
     notes: list[str] = []
@@ -167,7 +172,7 @@ def read(source: Source) -> Record:
     )
     index = next((table[:, j] for j, name in enumerate(text.names) if is_index(name, table[:, j])), None)
     t, note = rebuild(t, index)
-    if not source.text.endswith("\n") and text.body.rstrip(" "):
+    if given is None and not source.text.endswith("\n") and text.body.rstrip(" "):
         notes.append(_torn(text, table.shape[0]))
     signals = {name: table[:, j] for j, name in enumerate(text.names) if j != at and not (text.began and j < at)}
     return Record(

@@ -19,7 +19,6 @@ from upright.records.columns import stated_unit
 _FIRST = "LabVIEW Measurement"
 _END = "***End_of_Header***"
 _AXIS = "X_Value"
-_SPELLED = {"volts": "V", "volt": "V", "amps": "A", "amperes": "A", "seconds": "s", "meters": "m", "newtons": "N"}
 
 Tags = dict[str, list[str]]
 
@@ -86,7 +85,10 @@ def _segment(source: Source, tags: Tags, lines: Sequence[str], begin: int, start
     return _Segment(
         t=table[:, axes[0]] if axes else _steps(source, own, table.shape[0], at + 2),
         signals={names[i]: table[:, i] for i in channels},
-        units={names[i]: _unit(label) for i, label in zip(channels, own.get("Y_Unit_Label", ()), strict=False)},
+        units={
+            names[i]: stated_unit(f"y ({label})")
+            for i, label in zip(channels, own.get("Y_Unit_Label", ()), strict=False)
+        },
     )  # fmt: skip
 
 
@@ -97,10 +99,6 @@ def _steps(source: Source, tags: Tags, samples: int, line: int) -> Array:
     except (KeyError, IndexError, ValueError):
         raise source.bad("no column and no Delta_X says when samples were taken; export X columns", line=line) from None
     return np.asarray(start + step * np.arange(samples), dtype=np.float64)
-
-
-def _unit(label: str) -> str:
-    return stated_unit(f"y ({_SPELLED.get(label.casefold(), label)})") if label else ""
 
 
 def _recognises(source: Source) -> bool:

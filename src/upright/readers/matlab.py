@@ -1,7 +1,8 @@
 """Variables of a MATLAB version 5 file, and which of them are signals on which time.
 
-Four habits are known: plain vectors beside a time vector; "structure with time" of Simulink's To Workspace;
-cells of pieces (``Y_id`` beside ``Time_id``) that follow on from each other; and this package's own files.
+Five habits are known: plain vectors beside a time vector; "structure with time" of Simulink's To Workspace; captures
+of dSPACE's ControlDesk; cells of pieces (``Y_id`` beside ``Time_id``) that follow on from each other; and this
+package's own files.
 Scalars, text and structures of settings become notes.
 
 The format is that of "MAT-File Format" (The MathWorks): a header of 128 bytes, then elements of a tag (type, length)
@@ -25,11 +26,12 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
+from upright.readers.dspace import captured
 from upright.readers.reader import Reader
 from upright.readers.resolution import rebuild
 from upright.readers.source import Source
 from upright.records import Array, Record
-from upright.records.columns import time_scale
+from upright.records.columns import stated_unit, time_scale
 from upright.records.record import KEY
 from upright.units import converted
 
@@ -77,7 +79,7 @@ def read(source: Source) -> Record:
 
 def record_of(source: Source, content: Variables, *, reader: str) -> Record:
     """Record of those variables that are signals on a time; what is a setting becomes a note."""
-    pieces = _pieces(source, content) or _structures(content) or _vectors(source, content)
+    pieces = _pieces(source, content) or captured(content) or _structures(content) or _vectors(source, content)
     if pieces is None or not pieces[1]:
         pieces = _vectors(source, _lifted(content)) or _table(content)
     if pieces is None or not pieces[1]:
@@ -96,6 +98,7 @@ def record_of(source: Source, content: Variables, *, reader: str) -> Record:
     return Record(
         t=t,
         signals=signals,
+        units={name: stated_unit(name) for name in signals},
         provenance=source.provenance(reader, *filter(None, [note]), *notes, *_settings(content)),
     )
 

@@ -20,6 +20,8 @@ ANGLES = {"rad": 1.0, "deg": math.pi / 180, "rev": 2 * math.pi}
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """SI value of the units in which logs hold places."""
 _SPELLED = {"\u00b0": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "count": "counts"}
+_SPELLED |= {"volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "newtons": "N"}
+_SPELLED |= {"second": "s", "seconds": "s", "meter": "m", "meters": "m", "metre": "m", "metres": "m"}
 _LONGEST = 200  # characters of a name that is looked into
 # the names are case-folded, which makes the micro sign a Greek letter
 _UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from upright.renamed import DRAWN, renamed
 from upright.verbs.answer import Answer
 from upright.verbs.command import command
 from upright.verbs.pages import folder, folder_if_given, pdf_has_folder, write_page
-from upright.verbs.values import open_log, texts
+from upright.verbs.values import open_log, pairs, texts
 
 if TYPE_CHECKING:
     from upright.closed_loop import Recovery
@@ -303,10 +303,11 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
 
 @command(
     "Log",
-    metavars={"out": "STUDY.toml", "plant": "NAME", "time_unit": "UNIT"},
+    metavars={"out": "STUDY.toml", "plant": "NAME", "time_unit": "UNIT", "scale": "COLUMN=SCALE"},
     helps={
         "out": "Study to write, or a folder for LOG.toml.",
         "plant": "Plant, when the columns do not tell: pendulum, furuta, torsional-2, ...",
+        "scale": 'What one unit of a sensor\'s voltage stands for, as in CH2="30 deg/V".',
     },
     defaults={"out": "."},
     more="""
@@ -320,7 +321,7 @@ def _plain_diagnosis(diagnosis: Diagnosis, html: Path | None) -> dict[str, Any]:
 @keeps_its_inputs
 def init(
     log: Log, *, out: PathLike | None = None, plant: str | None = None, reader: str | None = None,
-    time_unit: str | None = None,
+    time_unit: str | None = None, scale: Mapping[str, str] | Sequence[str] | str | None = None,
     force: bool = False,
 ) -> Answer[str]:  # fmt: skip
     """Write a commented study file from a log, filled in with what could be recognised; or from a MuJoCo model (.xml).
@@ -342,6 +343,9 @@ def init(
         Reader of the log, when it is not recognised.
     time_unit : str, optional
         Unit of a file's time column that states none, such as "ms".
+    scale : mapping of str to str, optional
+        By column: what one unit of a sensor's voltage, or of any other reading, stands for, as in "30 deg/V"; or texts
+        COLUMN=SCALE.
     force : bool
         Replace a study that exists.
 
@@ -381,7 +385,7 @@ def init(
         find(plant)
     if record is None:
         record, _ = open_log(path, reader, time_unit)
-    text = draft(record, inspect(record), beside or path, study, plant=plant or "")
+    text = draft(record, inspect(record), beside or path, study, plant=plant or "", scales=pairs(scale, "--scale"))
     for key, value in (("reader", reader), ("time_unit", time_unit)):
         if value:
             text = text.replace("[defaults]\n", f'[defaults]\n{key} = "{value}"\n')

@@ -13,7 +13,7 @@ from tests.identification.twins import FURUTA, PENDULUM, rig
 from upright.closed_loop.structures import ClosedLoop
 from upright.errors import BadInput
 from upright.identification import GreyBox, Parameter, Run
-from upright.identification.problem.residuals import Problem, formulate, unreached, unresolved
+from upright.identification.problem.residuals import Problem, formulate, idle, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.tracks import nearest_equilibrium, prepare
 from upright.identification.problem.unknowns import Unknown, friction_names, matters, shared_unknowns
@@ -245,7 +245,7 @@ def test_a_presliding_length_is_no_shorter_than_the_rounding_that_sees_it(
 
 def test_a_limit_that_no_run_reaches_leaves_the_cost_as_it_is() -> None:
     """The drive gives 3 N at most here: a limit of 4 N is idle, one of 2 N is not."""
-    for limit, idle in ((4.0, ("actuator.force_limit",)), (2.0, ())):
+    for limit, no_matter in ((4.0, ("actuator.force_limit",)), (2.0, ())):
         numbers = {n: Parameter(name=n, value=v) for n, v in VALUES.items()}
         numbers["actuator.gain"] = Parameter(name="actuator.gain", value=3.0)
         numbers["actuator.force_limit"] = Parameter(name="actuator.force_limit", value=limit, estimate=True)
@@ -256,7 +256,22 @@ def test_a_limit_that_no_run_reaches_leaves_the_cost_as_it_is() -> None:
         problem = formulate(
             GreyBox(plant=CART, parameters=numbers), [replace(run, y=y + 1e-3 * np.cos(DT * np.arange(N))[:, None])]
         )
-        assert unreached(problem, problem.start) == idle
+        assert unreached(problem, problem.start) == no_matter
+
+
+@pytest.mark.parametrize(("damping", "unseen"), [(0.0, {"actuator.relaxation": "actuator.damping"}), (0.4, {})])
+def test_in_how_much_time_a_braking_of_nothing_builds_up_leaves_the_cost_as_it_is(damping, unseen) -> None:
+    numbers = {n: Parameter(name=n, value=v) for n, v in VALUES.items()}
+    numbers["actuator.damping"] = Parameter(name="actuator.damping", value=damping)
+    numbers["actuator.relaxation"] = Parameter(name="actuator.relaxation", value=0.3)
+    run = swung(u=np.sign(np.sin(3 * DT * np.arange(N)))[:, None] * (DT * np.arange(N) < 3)[:, None], unknown=())
+    known = formulate(GreyBox(plant=CART, parameters=numbers), [run], thin=False)
+    y = known.simulate(0, np.zeros((0, 1)), N)[:, 0, :, 0]
+    for name in ("actuator.damping", "actuator.relaxation"):
+        numbers[name] = replace(numbers[name], estimate=True, lower=0.0)
+    noisy = replace(run, y=y + 1e-4 * np.cos(DT * np.arange(N))[:, None])
+    problem = formulate(GreyBox(plant=CART, parameters=numbers), [noisy])
+    assert idle(problem, problem.start) == unseen
 
 
 def test_the_nearest_equilibrium_counts_turns_from_the_record() -> None:

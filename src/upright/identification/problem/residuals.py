@@ -7,7 +7,7 @@ simulation. Residuals are in units of each signal's spread over its run, so that
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -442,12 +442,37 @@ def unreached(problem: Problem, x: Array) -> tuple[str, ...]:
     limits = [i for i in limits if math.isinf(neutral(plant, problem.unknowns[i].name))]
     most = problem.cost(x) * (1 + SAME) if limits else 0.0
 
-    def idle(i: int) -> bool:
-        beyond = x.copy()
-        beyond[i] = min(x[i] + math.log(FAR), problem.upper[i])
-        return problem.cost(beyond) <= most
+    def beyond(i: int) -> bool:
+        there = x.copy()
+        there[i] = min(x[i] + math.log(FAR), problem.upper[i])
+        return problem.cost(there) <= most
 
-    return tuple(problem.unknowns[i].name for i in limits if idle(i))
+    return tuple(problem.unknowns[i].name for i in limits if beyond(i))
+
+
+def idle(problem: Problem, x: Array) -> dict[str, str]:
+    """Numbers at coordinates `x` without which the cost is the same, each with the term that they shape.
+
+    In how much time a braking of nearly 0 builds up shows in no run, and an interval of it would be rounding's.
+    """
+    estimated = {u.name: i for i, u in enumerate(problem.unknowns) if u.estimated and u.shared and not u.log}
+    shaping = {name: term for name, term in _shaping(problem.rig) if name in estimated}
+    most = problem.cost(x) * (1 + SAME) if shaping else 0.0
+
+    def without(name: str) -> bool:
+        there, i = x.copy(), estimated[name]
+        there[i] = problem.lower[i]
+        return problem.unknowns[i].lower == neutral(problem.rig.plant, name) and problem.cost(there) <= most
+
+    return {name: term for name, term in shaping.items() if without(name)}
+
+
+def _shaping(rig: GreyBox) -> Iterator[tuple[str, str]]:
+    """Numbers that say how a term acts, and the term."""
+    yield "actuator.relaxation", "actuator.damping"
+    for joint in rig.plant.derived().joints:
+        if joint.stribeck_speed and joint.stiction:
+            yield joint.stribeck_speed, joint.stiction
 
 
 def _shortest(rig: GreyBox, runs: Sequence[Run]) -> dict[str, float]:

@@ -42,9 +42,9 @@ class SearchLog:
 
     `best` holds the problem last worked on and where in it the search stood, `lower` a problem, a lower cost of it met
     since and where, `valleys` the same of where else descents ended, `rivals` values of another model that the data do
-    not refuse, `unresolved` lengths below the rounding and `unreached` limits. `conventions` says which signs and zeros
-    look wrong; evaluated only when a fit is poor, since no search mends a reversed sign. `path` are the mean squared
-    residual and the shared numbers after each accepted step.
+    not refuse, `unresolved` lengths below the rounding, `unreached` limits and `idle` numbers, with the term that they
+    shape. `conventions` says which signs and zeros look wrong; evaluated only when a fit is poor, since no search mends
+    a reversed sign. `path` are the mean squared residual and the shared numbers after each accepted step.
     """
 
     progress: Progress = silent
@@ -56,6 +56,7 @@ class SearchLog:
     rivals: dict[str, float] = field(default_factory=dict[str, float])
     unresolved: tuple[str, ...] = ()
     unreached: tuple[str, ...] = ()
+    idle: dict[str, str] = field(default_factory=dict[str, str])
     conventions: Callable[[], Sequence[str]] = tuple
     path: list[tuple[float, dict[str, float]]] = field(default_factory=list[tuple[float, dict[str, float]]])
 

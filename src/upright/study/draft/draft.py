@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from upright.readers import inspect
 from upright.readers.inspection import Inspection
 from upright.records import Record
 from upright.study.clock import check_clock
+from upright.study.draft.analogue import as_logged, in_places
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
 from upright.study.draft.compare import CLEAR, DOUBTFUL, LONGEST, explained
@@ -26,10 +28,14 @@ from upright.study.draft.suits import COUNTED, plants_that_suit
 from upright.study.text import TomlTable, study_text
 from upright.study.windows import window_sentence
 
+NONE: Mapping[str, str] = MappingProxyType({})
 CHAINS = ("rectilinear", "torsional")
 
 
-def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, plant: str = "") -> str:
+def draft(
+    record: Record, inspection: Inspection, log: Path, study: Path, *, plant: str = "",
+    scales: Mapping[str, str] = NONE,
+) -> str:  # fmt: skip
     """Text of a study of one log.
 
     Parameters
@@ -40,6 +46,8 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
         Its file, and where the study will be written: the file is named relative to that.
     plant : str, optional
         Overrides the plant that the columns suggest.
+    scales : mapping of str to str, optional
+        By column: the angle or length that one unit of it stands for, as in "30 deg/V".
 
     Raises
     ------
@@ -47,6 +55,10 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
         When nothing moves, or the clock cannot be in seconds.
     """
     check_clock(record)
+    logged = record
+    if scales:
+        record = in_places(record, scales)
+        inspection = inspect(record)
     recognised, tables = _drafted(record, inspection, log, study, plant)
     doubts = recognised.doubts
     if not plant:
@@ -56,6 +68,7 @@ def draft(record: Record, inspection: Inspection, log: Path, study: Path, *, pla
         doubts = (*recognised.doubts, *sentences)
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
         rig.key("guessed", True, "the plant was not given; delete this line once you are sure of it")
+    as_logged(tables, logged, scales)
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# Quantities are written with units. { guess = ... } is estimated; a text or number alone is known.")

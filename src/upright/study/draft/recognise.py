@@ -91,7 +91,8 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
     positions = position_columns(record, inspection)
     if not positions:
         raise BadInput(
-            f"{inspection.file}: no column moves like an angle, a position or a count; `upright show` lists all"
+            f"{inspection.file}: no column moves like an angle, a position or a count; `upright show` lists all."
+            f"{_of_sensors(inspection)}"
         )
     drive = drive_column(record, inspection)
     doubts: list[str] = []
@@ -157,6 +158,15 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         earlier=earlier,
         accelerates=accelerates,
     )
+
+
+def _of_sensors(inspection: Inspection) -> str:
+    """What to try where only voltages and the like move."""
+    moves = [c for c in inspection.columns if c.unit and not c.constant and not c.drive and not is_supply(c.name)]
+    if not moves:
+        return ""
+    name, unit = moves[-1].name, moves[-1].unit
+    return f" Where '{name}' is a sensor's reading, say what one {unit} of it is: --scale \"{name}=30 deg/{unit}\"."
 
 
 def pushed_coordinate(plant: str, columns: Mapping[str, Column]) -> str:
