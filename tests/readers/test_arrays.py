@@ -11,7 +11,7 @@ from numpy.lib import format as npy
 
 from upright.errors import BadInput
 from upright.readers import read_source
-from upright.readers.arrays import READER
+from upright.readers.formats.arrays import READER
 from upright.readers.source import Source
 
 T = np.arange(50) * 0.01

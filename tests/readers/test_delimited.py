@@ -10,7 +10,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.readers import read_source
-from upright.readers.delimited import begins_with_number, layout
+from upright.readers.formats.delimited import begins_with_number, layout
 from upright.readers.source import Source, TextTable
 from upright.records import Record
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput
-from upright.readers.ecp import READER, read
+from upright.readers.formats.ecp import READER, read
 from upright.readers.source import Source
 
 HEAD = " Sample   Time     Commanded Pos   Encoder 1 Pos   Control Effort"

@@ -143,7 +143,7 @@ def test_a_bag_says_that_the_first_of_its_joints_moved_before_the_first_command(
 def test_our_matlab_parser_agrees_with_scipy(compressed: bool) -> None:
     from scipy.io import savemat
 
-    from upright.readers.matlab import variables
+    from upright.readers.formats.matlab import variables
 
     rng = np.random.default_rng(1)
     given_ = {

@@ -16,7 +16,7 @@ from scipy.io import savemat
 from tests.readers.test_damage import element, matlab, start
 from upright.errors import BadInput
 from upright.readers import read_source
-from upright.readers.matlab import READER, variables
+from upright.readers.formats.matlab import READER, variables
 from upright.readers.source import Source
 from upright.records import Record
 

@@ -7,7 +7,7 @@ import pytest
 
 from upright.errors import BadInput
 from upright.readers import read_source
-from upright.readers.rosbag import READER
+from upright.readers.formats.rosbag import READER
 from upright.readers.source import Source
 from upright.records import Record
 

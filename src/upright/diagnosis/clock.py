@@ -12,7 +12,7 @@ from upright.diagnosis.case import Case
 from upright.diagnosis.findings import Curve, Finding, Panel
 from upright.errors import BadInput
 from upright.readers import read_source, reader_of
-from upright.readers.delimited import layout
+from upright.readers.formats.delimited import layout
 from upright.readers.source import Source, load
 from upright.records import Array, PathLike, Record
 from upright.records.columns import time_scale

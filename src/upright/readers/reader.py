@@ -12,7 +12,7 @@ from upright.records import Record
 
 @dataclass(frozen=True, kw_only=True)
 class Reader(Declaration):
-    """Reader of one format; an object of a module of this room, or the entry point of a package.
+    """Reader of one format; an object of a module of `formats`, or the entry point of a package.
 
     Attributes
     ----------
@@ -36,6 +36,6 @@ class Reader(Declaration):
 
 
 READERS = Declared(
-    "reader", "upright.readers", declared_in(Reader, "upright.readers"), lambda value: isinstance(value, Reader)
+    "reader", "upright.readers", declared_in(Reader, "upright.readers.formats"), lambda value: isinstance(value, Reader)
 )
 """Every reader by name."""

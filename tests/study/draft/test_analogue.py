@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import upright as up
 from upright.errors import BadInput
 from upright.records import Record
-from upright.study.draft.analogue import in_places
+from upright.records.analogue import in_places
 
 T = 0.004 * np.arange(2500)
 

@@ -10,8 +10,8 @@ import numpy as np
 from upright import units
 from upright.errors import BadInput
 from upright.identification.frequency.response import Array, Complex, FrequencyResponse
-from upright.readers import excel
-from upright.readers.delimited import layout
+from upright.readers.formats import excel
+from upright.readers.formats.delimited import layout
 from upright.readers.responses import UNITS, ResponseColumn, response_columns
 from upright.readers.source import TextTable, load
 

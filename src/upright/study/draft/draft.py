@@ -16,8 +16,8 @@ from upright.physics import find
 from upright.readers import inspect
 from upright.readers.inspection import Inspection
 from upright.records import Record
+from upright.records.analogue import in_places
 from upright.study.clock import check_clock
-from upright.study.draft.analogue import as_logged, in_places
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
 from upright.study.draft.compare import CLEAR, DOUBTFUL, LONGEST, explained
@@ -25,6 +25,7 @@ from upright.study.draft.described import describe
 from upright.study.draft.pendulum import pendulum_tables
 from upright.study.draft.recognise import Recognised, named_after, recognise
 from upright.study.draft.suits import COUNTED, plants_that_suit
+from upright.study.draft.tables import as_logged
 from upright.study.text import TomlTable, study_text
 from upright.study.windows import window_sentence
 

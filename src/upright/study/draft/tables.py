@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 
 from upright import units
 from upright.physics import Plant
@@ -10,9 +11,10 @@ from upright.physics.statement import Coordinate
 from upright.quantities import with_unit
 from upright.readers.inspection import DAC_COUNTS_PER_VOLT, Column
 from upright.records import Record
+from upright.records.analogue import place_per
 from upright.records.columns import ANGLES, LENGTHS
 from upright.study.draft.recognise import in_dac_counts
-from upright.study.text import TomlTable, Value
+from upright.study.text import TomlTable, Value, toml
 from upright.study.windows import digits_within
 
 PLACES = (*ANGLES, *LENGTHS)
@@ -108,6 +110,26 @@ def sensor_table(
     else:
         table.key("sign", -1, "when the column counts the other way", off=True)
     return table
+
+
+def as_logged(tables: Sequence[TomlTable], record: Record, scales: Mapping[str, str]) -> None:
+    """Say in the sensors of a draft what the log holds, and by which scale it becomes a place."""
+    for table in tables:
+        stated = tomllib.loads(str(table)).get("sensors", {}) if table.lines[0].startswith("[sensors.") else {}
+        for sensor in stated.values():
+            if (name := sensor["column"]) not in scales:
+                continue
+            unit = record.units[name]
+            zero = sensor["offset"] / place_per(scales[name], unit)[1]
+            given = [f"scale = {toml(scales[name])}   # as given"]
+            for i, line in enumerate(table.lines):
+                if line.startswith("column ="):
+                    span = f"{record[name].min():.6g} to {record[name].max():.6g} {unit}".rstrip()
+                    table.lines[i] = f"{line.partition('   # ')[0]}   # {span}"
+                elif line.startswith("unit ="):
+                    table.lines[i] = "\n".join([f"unit = {toml(unit)}", *given] if unit else given)
+                elif line.startswith("offset ="):
+                    table.lines[i] = line.replace(line.split()[2], toml(zero, 9), 1)
 
 
 def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list[TomlTable]:

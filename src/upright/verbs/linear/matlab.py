@@ -9,7 +9,7 @@ import numpy as np
 
 from upright.errors import BadInput, nearest
 from upright.files import PathLike, read_bytes
-from upright.readers.matlab import Variables, variables
+from upright.readers.formats.matlab import Variables, variables
 from upright.readers.source import Source
 from upright.systems import StateSpace
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from upright.errors import BadInput
-from upright.readers.delimited import read_table
+from upright.readers.formats.delimited import tabulated
 from upright.readers.reader import Reader
 from upright.readers.source import Source, cell
 from upright.readers.stamps import in_seconds
@@ -54,7 +54,7 @@ def read(source: Source) -> Record:
         clocks = _clocks(source, times, header[when])
         for name in others:
             columns[name] = _held(source, name, clocks[name], columns[name], clocks[base])
-    record = read_table(source, _wide(header[when], times[base], columns))
+    record = tabulated(source, _wide(header[when], times[base], columns))
     held = [f"Held from value to value, the first before it: {', '.join(others)}."] if others else []
     return record.replace(provenance=source.provenance("tidy", *record.provenance.notes, *held))
 

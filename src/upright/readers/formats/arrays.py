@@ -12,7 +12,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from upright.errors import BadInput
-from upright.readers.matlab import Unreadable, Variables, record_of
+from upright.readers.formats.matlab import Unreadable, Variables, record_of
 from upright.readers.reader import Reader
 from upright.readers.source import Source
 from upright.records import Record

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.readers.delimited import begins_with_number
+from upright.readers.formats.delimited import begins_with_number
 from upright.readers.reader import Reader
 from upright.readers.resolution import exact_seconds
 from upright.readers.source import Source, cell

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from upright.errors import BadInput
-from upright.readers.dspace import captured
+from upright.readers.formats.dspace import captured
 from upright.readers.reader import Reader
 from upright.readers.resolution import rebuild
 from upright.readers.source import Source

@@ -60,9 +60,9 @@ def read(source: Source) -> Record:
 
 def _beside(lines: Sequence[str]) -> _Screen:
     cells = [line.split(",") for line in lines]
-    said = {row[0].strip(): row[1].strip() for row in cells if row[0].strip()}
+    header = {row[0].strip(): row[1].strip() for row in cells if row[0].strip()}
     return _Screen(
-        names=[said.get("Source", "CH1")], units=[said.get("Vertical Units", "")], first_line=1,
+        names=[header.get("Source", "CH1")], units=[header.get("Vertical Units", "")], first_line=1,
         rows=[",".join(_filled(row[3:])) for row in cells],
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import Any
 from zipfile import BadZipFile, ZipFile
 
 from upright.errors import BadInput
-from upright.readers import delimited
+from upright.readers.formats import delimited
 from upright.readers.reader import Reader
 from upright.readers.source import Source
 from upright.records import Record

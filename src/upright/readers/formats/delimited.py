@@ -137,10 +137,10 @@ def _first_lines(text: str) -> list[str]:
 
 def read(source: Source) -> Record:
     """Record of a table; time is the column named like it, else the first when it increases."""
-    return read_table(source)
+    return tabulated(source)
 
 
-def read_table(source: Source, given: str | None = None) -> Record:
+def tabulated(source: Source, given: str | None = None) -> Record:
     """The record that `read` makes; of a `given` text where the table stands otherwise in the file."""
     text = layout(source, given)
     table = text.numbers()
