@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -94,7 +95,12 @@ def station(rig, folder, report=lambda run, end, started: "the verdict") -> Iter
 def felt(desk, law):
     """What the loop takes at its next tick: taps, other gains, and the reference."""
     taps, changes = [], []
-    beside = SimpleNamespace(law=law, change=lambda other: changes.append(other) or "")
+    beside = SimpleNamespace(
+        law=law,
+        change=lambda other: changes.append(other) or "",
+        target=(0.0, math.pi),
+        about=SimpleNamespace(period=1e-3),
+    )
     reference = desk.heed(SimpleNamespace(tap=taps.append, units=("rad", "rad"), supervisor=beside))
     return taps, changes, reference
 

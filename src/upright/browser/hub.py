@@ -9,6 +9,7 @@ from typing import Any
 
 from upright.browser.frames import frames, step_of
 from upright.browser.outbox import Outbox
+from upright.browser.rig import numbers
 from upright.browser.station import Station
 
 SECOND = 1.0
@@ -27,7 +28,7 @@ class Hub:
         self.clients: dict[Outbox, str] = {}
         self._issued: dict[str, None] = {}  # who has been here, the oldest first
         self._step = step_of(station.rig.model.limit, station.rig.model.converter)
-        self._next, self._late, self._answered, self._desk = 0, 0, 0, station.desk
+        self._next, self._late, self._answered, self._followed, self._desk = 0, 0, 0, 0, station.desk
         self._shown: Any = None
         self._scene = self._described()
         self._when = self._sent = 0.0
@@ -58,6 +59,7 @@ class Hub:
         self.station.beat()
         self._samples()
         self._answer()
+        self._follow()
         station = self.station
         now_so = (station.state, station.why, station.lease.holder, station.verdict, station.last.phase,
                 station.last.mode, station.last.faults, station.hanging)  # fmt: skip
@@ -72,7 +74,7 @@ class Hub:
     def _samples(self) -> None:
         desk = self.station.desk
         if desk is not self._desk:
-            self._desk, self._next, self._late, self._answered = desk, 0, 0, 0
+            self._desk, self._next, self._late, self._answered, self._followed = desk, 0, 0, 0, 0
             self._scenes()
         if desk is None:
             return
@@ -106,14 +108,28 @@ class Hub:
         self.everybody({"type": "applied", "poles": poles, "K": loop.K[0].tolist(), "at_tick": tick})
         self._scenes()
 
+    def _follow(self) -> None:
+        """What the loop follows from some tick on."""
+        followed = None if self.station.desk is None else self.station.desk.followed
+        if followed is not None and followed[0] != self._followed:
+            self._followed = followed[0]
+            self._scenes()
+
     def _scenes(self) -> None:
         self._scene = self._described()
         for outbox, who in self.clients.items():
             outbox.note(self._scene_of(who))
 
     def _described(self) -> str:
-        rig, K = self.station.rig, self.station.gains
-        changed = {} if K is None else {"poles": rig.poles(K), "K": K[0].tolist()}
+        station = self.station
+        rig, K, desk = station.rig, station.gains, station.desk
+        changed: dict[str, Any] = {} if K is None else {"poles": rig.poles(K), "K": K[0].tolist()}
+        if rig.follows and station.loop is not None:
+            changed["law"] = numbers(station.loop.law)
+        if desk is not None and (followed := desk.followed) is not None:
+            _, reference, tick, target = followed
+            changed["reference"] = {"value": reference.size, "shape": reference.shape, "period": reference.period,
+                                    "tick": tick, "about": list(target[: len(rig.model.per_unit)])}  # fmt: skip
         return json.dumps({**rig.scene, **changed})
 
     def _scene_of(self, who: str) -> str:

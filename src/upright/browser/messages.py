@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 from upright.errors import BadInput, nearest
+from upright.realtime.reference import SHAPES
 
 HELD, HANGING = "held", "hanging"
 """Where a run begins."""
@@ -49,6 +50,12 @@ def _where(value: Any) -> str:
     return str(value)
 
 
+def _shape(value: Any) -> str:
+    if value not in SHAPES:
+        raise ValueError(f"one of {', '.join(SHAPES)}")
+    return str(value)
+
+
 def _list(value: Any) -> list[Any]:
     if not isinstance(value, list) or len(value) > _STATES:  # type: ignore[reportUnknownArgumentType]
         raise ValueError(f"a list of at most {_STATES}")
@@ -80,7 +87,7 @@ TABLE: Mapping[str, Mapping[str, tuple[Callable[[Any], Any], bool]]] = {
     "rearm": {},
     "tap": {"coordinate": (_text, True), "speed": (_number, True)},
     "poles": {"poles": (_poles, True), "confirm": (_flag, False)},
-    "reference": {"value": (_number, True)},
+    "reference": {"value": (_number, True), "shape": (_shape, False), "period": (_number, False)},
 }
 """By what is asked for: each field with what reads it, and whether it is needed."""
 

@@ -121,8 +121,27 @@ class BenchRig:
             "zero": [zeroed[c.name] for c in plant.coordinates], "equilibrium": self.at,
             "poles": [] if self.loop is None else self.poles(self.loop.K),
             "K": [] if self.loop is None else self.loop.K[0].tolist(),
-            "follows": self.follows, "basis": self.basis.plain(),
+            "follows": self.follows, "basis": self.basis.plain(), **self._loop_to_follow,
         }  # fmt: skip
+
+    @property
+    def _loop_to_follow(self) -> dict[str, Any]:
+        """Where the law follows a reference: which coordinate is looked at, and what predicts its answer."""
+        if not self.follows or not isinstance(self.law, Law):
+            return {}
+        names, linear = [c.name for c in self.model.plant.coordinates], self.linear
+        pendulum = "inverted" in self.model.plant.equilibria
+        return {
+            "tracked": names.index(self.model.plant.inputs[0].on) if pendulum else len(names) - 1,
+            "linear": {"A": linear.A.tolist(), "B": linear.B[:, 0].tolist(), "delay": self.model.delay},
+            "law": numbers(self.law),
+        }
+
+
+def numbers(law: Law) -> dict[str, Any]:
+    """Matrices of a law, and its memories at the start by readings, as JSON holds them."""
+    begin = np.zeros((len(law.A), law.readings)) if law.begin is None else np.asarray(law.begin)
+    return {name: np.asarray(getattr(law, name)).tolist() for name in ("A", "B", "C", "D")} | {"begin": begin.tolist()}
 
 
 def known_rig(path: Path, law: Path | None, folder: Path) -> BenchRig:

@@ -23,6 +23,7 @@ from upright.errors import BadInput, UprightError, nearest
 from upright.live.twin import Loop
 from upright.realtime.desk import Desk
 from upright.realtime.process import BY_HAND, DEAF, run_in_process
+from upright.realtime.reference import STEP, Reference
 from upright.realtime.session import RunEnd, RunState
 from upright.records import Array
 from upright.rigs.board import SENTENCES
@@ -35,6 +36,8 @@ LONGEST, USUAL = 3600.0, 600.0
 TILT, ASIDE = math.radians(3.0), 0.003
 """How far a twin's hand lets go from what is held, where nobody says [rad, m]."""
 NOT_DESIGNED = "Its swing-up is being designed, which takes some seconds."
+PERIODS = (0.2, 60.0)
+"""Of a wave that is followed [s]."""
 FASTEST = 20.0
 """Tap that a twin's hand gives at most [rad/s or m/s]."""
 
@@ -203,15 +206,19 @@ class Station:
             raise BadInput("the last change is not answered yet.")
         self.requested = loop
 
-    def follow(self, who: str, value: float) -> None:
-        """Give the law another reference."""
+    def follow(self, who: str, value: float, *, shape: str = STEP, period: float = 0.0) -> None:
+        """Give the law another reference: a step, or a wave of a period [s]."""
         self._operated(who)
         if not self.rig.follows or (self.from_hanging and not self.over):
             raise BadInput("its law follows no reference.")
         most = self.rig.model.travel
         if abs(value) > min(most, 1e3):
             raise BadInput(f"a reference lies within its travel of {most:.4g}.")
-        self._running().follow(value)
+        if shape == STEP and period:
+            raise BadInput("a step has no period.")
+        if shape != STEP and not PERIODS[0] <= period <= PERIODS[1]:
+            raise BadInput(f"a {shape} has a period from {PERIODS[0]:g} to {PERIODS[1]:g} s, got {period:g} s.")
+        self._running().follow(Reference(size=value, shape=shape, period=period))
 
     def close(self) -> None:
         """Stop it, and wait until it is at rest and its log is whole."""

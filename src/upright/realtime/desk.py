@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from upright.errors import UprightError
 from upright.laws import Law
+from upright.realtime.reference import SHAPES, Reference
 from upright.realtime.session import RunState, Stage
 
 ROWS = 4096
@@ -31,7 +32,8 @@ ROW = np.dtype(
 )  # fmt: skip
 """A tick; its number stands at both ends, so that a row that is being written is known by it."""
 
-_HEAD, _STOP, _FOLLOWS, _CHANGED, _ANSWERED, _AT, _TAKEN, _MARKS = range(8)
+_HEAD, _STOP, _GIVEN, _FOLLOWED, _SINCE, _CHANGED, _ANSWERED, _AT, _TAKEN, _MARKS = range(10)
+_SLOTS, _OF_SLOT = 16, 3  # references that are not written over while one of them is read, and numbers of each
 _PACKED = struct.Struct(f"<5q{ENCODERS}q2dq")
 _SENTENCE = 400
 
@@ -44,10 +46,12 @@ class Desk:
         self._marks = context.RawArray("q", _MARKS)
         self._ring = context.RawArray("c", ROWS * ROW.itemsize)
         self._taps = context.RawArray("d", ENCODERS)  # sums of all so far, so that none is lost
-        self._reference = context.RawValue("d", 0.0)
+        self._references = context.RawArray("d", _SLOTS * _OF_SLOT)
+        self._target = context.RawArray("d", ENCODERS)
         self._law = context.RawArray("d", 1 + NUMBERS)
         self._sentence = context.RawArray("c", _SENTENCE + 1)
         self._felt = [0.0] * ENCODERS
+        self._follows: Reference | None = None
 
     # in the process that started the run
 
@@ -59,10 +63,20 @@ class Desk:
         """A tap of a twin's hand [rad/s or m/s]; a rig that is no twin feels none."""
         self._taps[coordinate] += speed
 
-    def follow(self, value: float) -> None:
-        """What the law's first reference is from now on [rad or m]."""
-        self._reference.value = value
-        self._marks[_FOLLOWS] = 1
+    def follow(self, reference: Reference) -> None:
+        """What the law's first reference is from the next tick on."""
+        number = self._marks[_GIVEN] + 1
+        begin = number % _SLOTS * _OF_SLOT
+        self._references[begin : begin + _OF_SLOT] = [
+            float(SHAPES.index(reference.shape)), reference.size, reference.period
+        ]  # fmt: skip
+        self._marks[_GIVEN] = number
+
+    @property
+    def followed(self) -> tuple[int, Reference, int, tuple[float, ...]] | None:
+        """Number of the reference that the loop follows, itself, the tick where it began, and what was held there."""
+        number = self._marks[_FOLLOWED]
+        return (number, self._reference(number), self._marks[_SINCE], tuple(self._target)) if number else None
 
     def change(self, law: Law) -> bool:
         """Ask for C and D of a law that has all else alike; False while the last change is not answered."""
@@ -118,7 +132,20 @@ class Desk:
             self._felt = taps
             stage.tap(speeds[: len(stage.units)])
             marks[_TAKEN] = time.monotonic_ns()
-        return self._reference.value if marks[_FOLLOWS] else None
+        if (number := marks[_GIVEN]) != marks[_FOLLOWED]:
+            self._follows = self._reference(number)
+            target = stage.supervisor.target[:ENCODERS]
+            self._target[: len(target)] = target
+            marks[_SINCE] = marks[_HEAD]
+            marks[_FOLLOWED] = number  # last, since whoever reads looks here first
+        if self._follows is None:
+            return None
+        return self._follows.at(marks[_HEAD] - marks[_SINCE], stage.supervisor.about.period)
+
+    def _reference(self, number: int) -> Reference:
+        begin = number % _SLOTS * _OF_SLOT
+        shape, size, period = self._references[begin : begin + _OF_SLOT]
+        return Reference(shape=SHAPES[int(shape)], size=size, period=period)
 
     def _answer(self, stage: Stage) -> None:
         law, values = stage.supervisor.law, np.array(self._law[1 : 1 + int(self._law[0])])

@@ -358,8 +358,8 @@ def _check_accepted(request: RunRequest, basis: Basis) -> None:
 
 
 def _references(law: Law | Rule, model: Rig) -> tuple[tuple[str, str], ...]:
-    """Names and units for the log of what the law follows; of signals that it came with or was given."""
-    if not isinstance(law, Law) or law.references is None:
+    """Names and units for the log of what the law follows, be it 0: somebody may change that meanwhile."""
+    if not isinstance(law, Law) or (law.references is None and not np.any(law.D[:, law.readings :])):
         return ()
     coordinates = {c.name for c in model.plant.coordinates}
     names = law.reference_names or tuple(f"reference_{i + 1}" for i in range(law.signal().shape[1]))
