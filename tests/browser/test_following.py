@@ -41,7 +41,8 @@ def shaft(tmp_path_factory):
 def followed(rig, folder, given, seconds):
     """Log of a run in virtual time, to which references are given before some ticks; and where each began."""
     desk, began = Desk(), []
-    run = prepared(RunRequest(rig=rig.rig_path, law=rig.law_path, seconds=seconds, check=False), folder)
+    wish = RunRequest(rig=rig.rig_path, law=rig.law_path, seconds=seconds, check=False, steered=rig.follows)
+    run = prepared(wish, folder)
 
     def heed(stage):
         tick = len(began)

@@ -133,6 +133,7 @@ class Station:
         request = RunRequest(
             rig=self.rig.rig_path, law=self._swing_path if hanging else self.rig.law_path, seconds=seconds,
             tilt=0.0 if hanging else self._tilt(start), from_rest=hanging, accept=accept,
+            steered=self.rig.follows and not hanging,
         )  # fmt: skip
         desk = Desk()
         with self._lock:

@@ -54,6 +54,7 @@ class RunRequest:
     `bolted` is the inertia that a twin's hands add to its first body before it [kg or kg m^2].
     `accept` says why a law from a model that is not trusted runs on hardware all the same.
     `settled` says that the rig hangs as it was zeroed and known, so that it is neither zeroed nor awaited again.
+    `steered` says that somebody gives the law references while it runs, so that each of them is logged.
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
 
@@ -73,6 +74,7 @@ class RunRequest:
     from_rest: bool = False
     accept: str | None = None
     settled: bool = False
+    steered: bool = False
     own_process: bool = False
 
     def __post_init__(self) -> None:
@@ -328,7 +330,7 @@ def prepared(request: RunRequest, folder: Path) -> PreparedRun:
     else:
         samples = request.samples or signal(request.excite or "", model.unit, model.period, request.seconds)
         law = excitation_law(samples, len(model.per_unit), model.period)
-    references = _references(law, model) if request.law is not None else ()
+    references = _references(law, model, request.steered) if request.law is not None else ()
     folder.mkdir(parents=True, exist_ok=True)
     path = fresh(folder, request.stem, ".mcap")
     order = RunOrder(
@@ -357,9 +359,9 @@ def _check_accepted(request: RunRequest, basis: Basis) -> None:
         )
 
 
-def _references(law: Law | Rule, model: Rig) -> tuple[tuple[str, str], ...]:
-    """Names and units for the log of what the law follows, be it 0: somebody may change that meanwhile."""
-    if not isinstance(law, Law) or (law.references is None and not np.any(law.D[:, law.readings :])):
+def _references(law: Law | Rule, model: Rig, steered: bool = False) -> tuple[tuple[str, str], ...]:
+    """Names and units for the log of what the law follows; of signals that it came with, was or will be given."""
+    if not isinstance(law, Law) or (law.references is None and not steered):
         return ()
     coordinates = {c.name for c in model.plant.coordinates}
     names = law.reference_names or tuple(f"reference_{i + 1}" for i in range(law.signal().shape[1]))
