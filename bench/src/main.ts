@@ -1,4 +1,4 @@
-// The bench: one rig on three screens, and what is there on each of them.
+// The bench: one rig on several screens, and what is there on each of them.
 
 import { Bar, isPhone, message } from "./bar";
 import { Design } from "./design";
@@ -6,13 +6,14 @@ import { byId, make } from "./dom";
 import { Run } from "./run";
 import { Runs } from "./runs";
 import { Session } from "./session";
+import { Track } from "./track";
 
 interface Listed {
   name: string;
   title: string;
 }
 
-const SCREENS = ["run", "design", "runs"] as const;
+const SCREENS = ["run", "design", "track", "runs"] as const;
 type Screen = (typeof SCREENS)[number];
 
 const AGAIN = 1000; // ms
@@ -42,7 +43,7 @@ async function bench(): Promise<void> {
   const all = await rigs(), name = (all.find((rig) => rig.name === place()[0]) ?? all[0])?.name;
   if (!name) return message("This bench has no rig; start it with a RIG.toml.");
   // The rig's kernel is compiled at the first request: what stops the rig does not wait for it.
-  let moving = false, design: Design | undefined, built = "";
+  let moving = false, design: Design | undefined, built = "", wanted = place()[1];
   const scene = () => {
     if (!session.scene) return;
     bar.scene();
@@ -54,6 +55,9 @@ async function bench(): Promise<void> {
       design ??= new Design(session);
       design.scene();
     }
+    track.scene(moving);
+    offer("design", moving);
+    offer("track", session.scene.tracked !== undefined);
     bar.show();
   };
   const session: Session = new Session(name, {
@@ -65,13 +69,14 @@ async function bench(): Promise<void> {
       if (before?.state !== "starting" && state?.state === "starting") session.history.clear();
       bar.show();
       design?.gate();
+      track.gate();
     },
     message,
   });
-  const run = new Run(session), runs = new Runs(session);
+  const run = new Run(session), runs = new Runs(session), track = new Track(session);
   const bar = new Bar(session, { start: () => run.start(), tap: () => run.tap() });
-  const show = (wanted: string | undefined) => {
-    const screen: Screen = (!isPhone() && SCREENS.find((s) => s === wanted && (moving || s !== "design"))) || "run";
+  const show = (asked: string | undefined) => {
+    const screen: Screen = (!isPhone() && SCREENS.find((s) => s === asked && !byId(`tab-${s}`).hidden)) || "run";
     for (const s of SCREENS) {
       byId(s).hidden = s !== screen;
       byId(`tab-${s}`).setAttribute("aria-selected", `${s === screen}`);
@@ -79,9 +84,16 @@ async function bench(): Promise<void> {
     }
     history.replaceState(null, "", `#/${encodeURIComponent(name)}/${screen}`);
     if (screen === "runs") void runs.show();
+    if (screen === "track") track.shown();
+  };
+  /** Shows the tab of a screen that this rig has; the screen itself where the address asked for it. */
+  const offer = (screen: Screen, there: boolean) => {
+    byId(`tab-${screen}`).hidden = !there;
+    if (there && wanted === screen) show(wanted);
+    if (there && wanted === screen) wanted = undefined;
   };
   const tabs = () => SCREENS.filter((s) => !byId(`tab-${s}`).hidden);
-  for (const screen of SCREENS) byId(`tab-${screen}`).addEventListener("click", () => show(screen));
+  for (const screen of SCREENS) byId(`tab-${screen}`).addEventListener("click", () => { wanted = undefined; show(screen); });
   byId("tab-run").parentElement!.addEventListener("keydown", (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key], now = tabs().findIndex((s) => !byId(s).hidden);
     if (!step) return;
@@ -94,17 +106,15 @@ async function bench(): Promise<void> {
     byId("rigs").append(...all.map((rig) => make("a", { href: `#/${encodeURIComponent(rig.name)}/run`, ...(rig.name === name ? { "aria-current": "page" } : {}) }, rig.title)));
   }
   addEventListener("hashchange", () => (place()[0] === name ? show(place()[1]) : location.reload()));
-  const wanted = place()[1];
   show(wanted);
   void unknown(name).then((why) => {
     moving = why === "";
     run.note = why;
-    byId("tab-design").hidden = !moving;
     scene();
-    if (wanted === "design" && !byId("run").hidden) show(wanted);
   });
   const frame = () => {
     if (!byId("run").hidden) run.draw();
+    if (!byId("track").hidden) track.draw();
     bar.clock();
     requestAnimationFrame(frame);
   };

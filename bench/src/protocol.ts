@@ -1,5 +1,7 @@
 // What the page and the server say to each other over a rig's socket.
 
+import type { FollowedWave, LawNumbers, Shape } from "./following";
+
 export type Phase = "idle" | "starting" | "running" | "stopped" | "ended";
 
 export interface Coordinate {
@@ -28,6 +30,11 @@ export interface Scene {
   K: number[];
   basis: { level: string; sentence: string };
   follows: boolean;
+  /** Where the law follows a reference: index of the coordinate that is looked at, and what predicts its answer. */
+  tracked?: number;
+  linear?: { A: number[][]; B: number[]; delay: number };
+  law?: LawNumbers;
+  reference?: FollowedWave;
   you: string;
 }
 
@@ -57,7 +64,7 @@ export type ClientRequest =
   | { do: "start"; seconds?: number; start?: number[]; from?: State["from"]; accept?: string }
   | { do: "tap"; coordinate: string; speed: number }
   | { do: "poles"; poles: Complex[]; confirm?: boolean }
-  | { do: "reference"; value: number };
+  | { do: "reference"; value: number; shape?: Shape; period?: number };
 
 /** Samples of consecutive ticks. */
 export interface Frame {

@@ -11,7 +11,6 @@ const SATURATED = 1 - 1e-3, LAMP = 0.5; // part of the limit; seconds for which 
 const TILT = 3, ASIDE = 0.3, TAP = 0.8, LONGEST = 3600; // deg, cm, rad/s or m/s, s
 const IDLE = 15; // frames
 const FAR = Math.PI + 0.5; // from what is held, from where on another turn of it is nearer; hanging is near to two [rad]
-const FARTHEST = Math.PI; // reference where the travel has no end [rad or m]
 
 interface Channel {
   canvas: HTMLCanvasElement;
@@ -107,7 +106,7 @@ export class Run {
   }
 
   private settings(known: boolean): void {
-    const { kind, coordinates, follows, moved, travel, basis } = this.session.scene!, rows: HTMLElement[] = [], last = coordinates.at(-1)!;
+    const { kind, coordinates, basis } = this.session.scene!, rows: HTMLElement[] = [], last = coordinates.at(-1)!;
     const add = (...about: Parameters<typeof field>) => {
       const { row, input } = field(...about);
       rows.push(row);
@@ -117,10 +116,6 @@ export class Run {
     if (kind === "TWIN" && known) this.tilt = add(`start, ${short(last.meaning)} away`, shown.unit, last.unit === "rad" ? TILT : ASIDE, last.unit === "rad" ? [-10, 10, 0.5] : [-5, 5, 0.1]);
     this.seconds = add("stop after", "s", 600, [1, LONGEST, 1]);
     if (kind === "TWIN") this.speed = add("tap", `${last.unit}/s`, TAP, [-20, 20, 0.1]);
-    if (follows) {
-      const driven = coordinates[moved]!, { unit, scale } = shownUnit(driven.unit), most = Math.min(travel ?? Infinity, FARTHEST) * scale;
-      add(`reference, ${short(driven.meaning)}`, unit, 0, [-most, most, 1], (value) => this.session.steer({ do: "reference", value: value / scale }));
-    }
     this.reason = basis.level === "not trusted" ? make("input", { type: "text", maxlength: "200", value: this.reason?.value ?? "" }) : undefined;
     if (this.reason) rows.push(make("label", { class: "field" }, make("span", {}, "The model is not trusted. Reason to run it all the same"), this.reason));
     byId("next").replaceChildren(byId("next-title"), ...rows);
@@ -146,6 +141,7 @@ export class Run {
       drawStrip(canvas, {
         ...(c < n ? about(history.farthest(c, zero) * scale, least, unit) : limited(scene.command.limit, history.farthest(c, 0))),
         colour: c < n ? `--q${c % 4}` : "--effort", count: ticks, at: (k) => (history.ago(c, ticks - 1 - k) - zero) * scale,
+        ...(c === scene.tracked ? { also: (k) => (this.session.followed.at(history.last - (ticks - 1 - k), scene.period, c) - zero) * scale } : {}),
         times: Array.from({ length: 6 }, (_, i) => (i === 5 ? "now" : `\u2212${seconds - (i * seconds) / 5} s`)),
       });
     });

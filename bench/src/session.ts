@@ -1,5 +1,6 @@
 // A rig as the page knows it now, and what may be asked of it.
 
+import { Followed } from "./following";
 import { History } from "./history";
 import { type ClientRequest, type Scene, type State, type ServerMessage, decode } from "./protocol";
 import { Connection } from "./socket";
@@ -14,6 +15,8 @@ export class Session {
   scene: Scene | undefined;
   state: State | undefined;
   history = new History([], 1);
+  /** What the rig follows, and followed before. */
+  readonly followed = new Followed();
   connected = false;
   private readonly connection: Connection;
 
@@ -60,6 +63,7 @@ export class Session {
     if (received.type === "scene") {
       const fresh = !this.connected;
       this.scene = received;
+      this.followed.take(received.reference);
       sessionStorage.setItem(ME, received.you);
       this.connected = true;
       if (fresh) this.history = new History(received.coordinates.map((c) => c.per_unit), Math.round(SECONDS / received.period));

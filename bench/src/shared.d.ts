@@ -22,11 +22,13 @@ interface TwinData {
   away: number[];
   seconds: number;
   travel: number | null;
+  fallen: number;
   A: number[][];
   B: number[];
   K: number[];
   poles: Complex[];
   estimator: Record<"A" | "B" | "E" | "C" | "D" | "begin", number[][]>;
+  one: { arguments: { name: string; shape?: number[] }[] };
   many: { width: number };
   lanes: number;
 }
@@ -42,12 +44,13 @@ declare function law(estimator: TwinData["estimator"], K: number[]): Record<stri
 
 declare class Twin {
   constructor(data: TwinData);
+  one: { described: { parameters: string[] }; arrays: Record<"P" | "R", Float64Array> };
   settings: TwinSettings;
   gains: number[];
   lost: string;
   set(change: Partial<TwinSettings>): void;
   place(poles: Complex[]): void;
-  restart(): void;
+  restart(away?: number[]): void;
   advance(samples: number): Float64Array[];
 }
 

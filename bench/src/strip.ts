@@ -10,6 +10,8 @@ export interface Strip {
   colour: string;
   count: number;
   at: (k: number) => number;
+  /** A second line, thin, behind the first: what it is to be. */
+  also?: (k: number) => number;
   /** Labels of the time axis, from left to right. */
   times: string[];
   limit?: number;
@@ -26,7 +28,7 @@ export function drawStrip(canvas: HTMLCanvasElement, strip: Strip): void {
   }
   const c = canvas.getContext("2d")!, style = getComputedStyle(document.documentElement);
   const colour = (name: string) => style.getPropertyValue(name).trim();
-  const { range, tick, limit, count, at } = strip, right = width - 6;
+  const { range, tick, limit, count } = strip, right = width - 6;
   const x = (k: number) => LEFT + ((right - LEFT) * k) / Math.max(1, count - 1);
   const y = (v: number) => TOP + ((height - BELOW - TOP) * (1 - Math.max(-1, Math.min(1, v / range)))) / 2;
   const level = (v: number) => { c.moveTo(LEFT, y(v)); c.lineTo(width, y(v)); };
@@ -58,33 +60,37 @@ export function drawStrip(canvas: HTMLCanvasElement, strip: Strip): void {
     c.stroke();
     c.setLineDash([]);
   }
-  c.strokeStyle = colour(strip.colour);
-  c.lineWidth = 1.8;
-  c.lineJoin = "round";
-  c.beginPath();
-  let drawing = false;
-  const point = (k: number, v: number) => {
-    if (drawing) c.lineTo(x(k), y(v));
-    else c.moveTo(x(k), y(v));
-    drawing = true;
-  };
   // More samples than pixels: the least and the largest of each pixel say all that can be seen.
   const each = Math.max(1, Math.floor(count / (right - LEFT)));
-  for (let k = 0; k < count; k += each) {
-    let low = Infinity, high = -Infinity;
-    for (let i = k; i < Math.min(count, k + each); i++) {
-      const v = at(i);
-      if (v < low) low = v;
-      if (v > high) high = v;
+  const line = (at: (k: number) => number, name: string, thick: number) => {
+    let drawing = false;
+    const point = (k: number, v: number) => {
+      if (drawing) c.lineTo(x(k), y(v));
+      else c.moveTo(x(k), y(v));
+      drawing = true;
+    };
+    c.strokeStyle = colour(name);
+    c.lineWidth = thick;
+    c.lineJoin = "round";
+    c.beginPath();
+    for (let k = 0; k < count; k += each) {
+      let low = Infinity, high = -Infinity;
+      for (let i = k; i < Math.min(count, k + each); i++) {
+        const v = at(i);
+        if (v < low) low = v;
+        if (v > high) high = v;
+      }
+      if (low > high) {
+        drawing = false; // nothing came
+        continue;
+      }
+      point(k, low);
+      if (high > low) point(k, high);
     }
-    if (low > high) {
-      drawing = false; // nothing came
-      continue;
-    }
-    point(k, low);
-    if (high > low) point(k, high);
-  }
-  c.stroke();
+    c.stroke();
+  };
+  if (strip.also) line(strip.also, "--ink", 1.2);
+  line(strip.at, strip.colour, 1.8);
 }
 
 /** Scale of values about zero. */

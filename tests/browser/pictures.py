@@ -8,11 +8,11 @@ from pathlib import Path
 
 from tests.browser.students import PHONE, Server, browser, student
 
-NAMES = ("bench_run", "bench_design", "bench_phone")
+NAMES = ("bench_run", "bench_design", "bench_track", "bench_phone")
 
 
 def take(folder: Path, server: Server) -> None:
-    """Run, Design in the dark, and a phone that watches, each of a run that goes on."""
+    """Run, Track, Design in the dark, and a phone that watches, each of a run that goes on."""
     with browser() as chromium, student(chromium, server) as one:
         one.page.wait_for_selector("#drawing polyline", state="attached")
         one.starts()
@@ -25,6 +25,13 @@ def take(folder: Path, server: Server) -> None:
         with student(chromium, server, **{**PHONE, "device_scale_factor": 1}) as phone:
             phone.page.wait_for_timeout(5000)
             phone.page.screenshot(path=folder / "bench_phone.png")
+        one.page.click("#tab-track")
+        one.page.wait_for_timeout(4000)
+        one.page.click("#follow")
+        one.reads("#track-now", "step")
+        one.page.wait_for_timeout(6000)
+        one.page.screenshot(path=folder / "bench_track.png")
+        one.page.click("#home")
         one.page.emulate_media(color_scheme="dark")
         one.page.click("#tab-design")
         one.reads("#share", "rigs are stabilised")

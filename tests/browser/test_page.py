@@ -11,11 +11,13 @@ import pytest
 
 from tests.browser.students import DESK, PHONE, Server, browser, student
 from tests.browser.test_frames import decoded
+from upright.logs import read_log
+from upright.logs.replay import replay
 from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
 
-SCREENS = ("run", "design", "runs")
+SCREENS = ("run", "design", "track", "runs")
 LIGHT = 400_000
 """Bytes of the first load at most (issue 25)."""
 COVERS = """() => { const box = document.getElementById('stop').getBoundingClientRect(), inset = 3;
@@ -24,9 +26,9 @@ COVERS = """() => { const box = document.getElementById('stop').getBoundingClien
     .filter((e) => !e?.closest('#stop')).map((e) => e?.outerHTML.slice(0, 100) ?? 'outside') }"""
 """What lies over a place of the button STOP."""
 
-SPILLS = """[...document.querySelectorAll('#design:not([hidden]) > .panel')]
+SPILLS = """[...document.querySelectorAll('#design:not([hidden]) > .panel, #track:not([hidden]) > .panel')]
   .filter((e) => e.scrollHeight > e.clientHeight + 1).map((e) => e.innerText.slice(0, 60))"""
-"""Panels of the screen Design whose content lies over what is below them."""
+"""Panels of the screens Design and Track whose content lies over what is below them."""
 
 STANDS = """most => { const text = document.querySelectorAll('#readings dd')[1].textContent;
   return Math.abs(parseFloat(text.replace('\u2212', '-'))) < most * 180 / Math.PI }"""
@@ -250,6 +252,45 @@ def test_stop_ends_a_run_with_log_and_report_and_escape_stops_from_within_the_re
         one.leaves()
 
 
+def test_a_wave_is_followed_once_the_model_can_and_all_who_look_on_see_it(server, chromium):
+    with student(chromium, server) as one, student(chromium, server, screen="track") as another:
+        page = one.page
+        page.fill("#next label:has-text('start') input", "0")
+        page.click("#tab-track")
+        one.reads("#track-model", "twin in this page")
+        one.presses("#follow")
+        one.reads("#message", "Start the rig")
+        one.starts()
+        for shape, size, why in (
+            ("step", "400", "beyond the travel of 360 deg"), ("square", "300", "The pendulum of the model falls")
+        ):  # fmt: skip
+            page.select_option("#shape", shape)
+            page.fill("#wave-size", size)
+            page.keyboard.press("Enter")
+            one.reads("#track-gate", why)
+            one.presses("#follow")
+            one.reads("#message", why)
+        one.reads("#track-now", "nothing is followed")
+        page.select_option("#shape", "step")
+        page.fill("#wave-size", "20")
+        page.keyboard.press("Enter")
+        one.reads("#track-before", r"first the wrong way by\s*[1-9] %")  # a zero right of the axis
+        page.click("#follow")
+        for each in (one, another):
+            each.reads("#track-now", "step, 20.0 deg")
+            each.reads("#track-figures", r"error, rms, last second\s*\d")
+        another.presses("#follow")
+        another.reads("#message", "you cannot steer it")
+        page.click("#end")
+        one.sees("ended")
+        one.reads("#message", "Stopped after")  # its report is written
+        one.leaves()
+        assert one.wrong == another.wrong == []
+    log = read_log(max((server.folder / "furuta").glob("run*.mcap"), key=lambda path: path.stat().st_mtime))
+    assert set(log.columns["reference"]) == {0.0, math.radians(20)}
+    assert replay(log).identical
+
+
 def test_a_server_that_is_gone_is_said_and_its_successor_is_found(server, chromium):
     with student(chromium, server) as one:
         one.starts()
@@ -350,6 +391,21 @@ def test_of_several_rigs_each_has_its_page_and_one_without_a_drawing_says_why(ch
         assert not one.page.locator("#tab-design").is_visible()
         one.starts()
         one.reads("#readings", "deg")
+        tab_to(one.page, "#tab-run")
+        one.page.keyboard.press("ArrowRight")
+        one.reads("#track-model", "linear model with the command's limit")
+        one.page.select_option("#shape", "sine")
+        one.page.fill("#wave-size", "540")
+        one.page.fill("#wave-period", "0.5")
+        one.page.keyboard.press("Enter")
+        one.reads("#track-gate", r"at its limit for \d\d % of the time")
+        one.page.select_option("#shape", "step")
+        one.page.fill("#wave-size", "30")
+        one.page.keyboard.press("Enter")
+        tab_to(one.page, "#follow")
+        one.page.keyboard.press("Enter")
+        one.reads("#track-now", "step, 30.0 deg")
+        one.reads("#track-figures", r"error, rms, last second\s*(0\.\d|below one count)")  # the far disk is there
         one.leaves()
 
 
