@@ -278,7 +278,7 @@ def test_a_drive_that_is_on_goes_off_with_the_parent(tmp_path, event):
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux alone signals the death of a parent")
 def test_the_kernel_has_been_told_to_end_the_loop_with_its_parent():
     """As it says itself: PR_GET_PDEATHSIG of prctl(2) is 2."""
-    asked = "from upright.realtime.process import _end_with_parent; import ctypes; _end_with_parent()"
+    asked = "from upright.realtime.process import end_with_parent; import ctypes; end_with_parent()"
     told = "signal = ctypes.c_int(); ctypes.CDLL(None).prctl(2, ctypes.byref(signal)); print(signal.value)"
     ran = subprocess.run([sys.executable, "-c", f"{asked}; {told}"], capture_output=True, text=True, check=True)
     assert int(ran.stdout) == signal.SIGTERM
@@ -363,7 +363,7 @@ def child(folder, monkeypatch, *, make=None, parent=None, stop=0, paced=False, d
 
     standing = LoopPriority(priority="ordinary", locked=True, warning="Buy a clock.")
     monkeypatch.setattr("signal.signal", turned.setdefault)
-    for name, stand_in in (("step_forward", lambda fifo: standing), ("_end_with_parent", lambda: None),
+    for name, stand_in in (("step_forward", lambda fifo: standing), ("end_with_parent", lambda: None),
                            ("carry_out", carried)):  # fmt: skip
         monkeypatch.setattr(f"upright.realtime.process.{name}", stand_in)
     shared, flags = memory(), [SimpleNamespace(value=stop), SimpleNamespace(value=0)]

@@ -162,7 +162,7 @@ def _child(
 
     for each in ENDING:  # to be ended is to be zeroed first; Ctrl-C is the parent's affair
         signal.signal(each, signal.SIG_IGN if each == signal.SIGINT else _interrupt_once)
-    _end_with_parent()
+    end_with_parent()
     window, orphan, deaf = _Window(memory, phase), _orphaned(parent), _deaf(looks)
     if orphan():
         return  # before anything is opened
@@ -209,7 +209,7 @@ def _interrupt_once(_signal: int, _frame: object) -> None:
     raise KeyboardInterrupt
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Let the kernel send SIGTERM when the parent dies, also where no tick passes, as within a pulse or a wait.
 
     It is sent when the *thread* ends that started this process; `run_in_process` waits there for as long as this

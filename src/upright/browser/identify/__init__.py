@@ -1,0 +1,1 @@
+"""Screen Identify: logs that were kept or brought, and their fits."""

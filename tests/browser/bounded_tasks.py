@@ -1,0 +1,46 @@
+"""What a process of its own is asked to do in these tests; it imports nothing that takes time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+from upright.browser.identify.bounded import finish
+from upright.errors import BadInput
+
+
+def says(text, progress):
+    progress("the only step", 0.5)
+    return text
+
+
+def refuses(sentence, progress):
+    raise BadInput(sentence)
+
+
+def eats(progress):
+    return str(len(bytearray(64 << 30)))
+
+
+def never_ends(progress):
+    threading.Event().wait()
+    return "it ended"
+
+
+def ends_when_interrupted(progress):
+    progress("waiting", 0.0)
+    try:
+        threading.Event().wait()
+    except KeyboardInterrupt:
+        finish()
+        os.kill(os.getpid(), signal.SIGINT)  # of somebody who is impatient
+        return "the best so far"
+
+
+def dies(progress):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fails(progress):
+    return [][1]
