@@ -10,11 +10,15 @@ from contextlib import contextmanager
 from dataclasses import replace
 from types import SimpleNamespace
 
+from upright.browser.hanging import first_motions
 from upright.browser.rig import known_rig
+from upright.browser.runs import write_report
 from upright.browser.serve import TWIN
 from upright.browser.station import Station
+from upright.realtime.process import run_in_process
 from upright.realtime.session import RunEnd, RunState
 from upright.rigs import Mode
+from upright.running.run import prepared
 
 RUNNING = RunState(phase="running", time=1.0, tick=1000, mode=Mode.HOST, counts=(3, -4))
 SOON = 10.0
@@ -67,6 +71,14 @@ def twin(folder):
     path = folder / "furuta.toml"
     path.write_text(TWIN, encoding="utf-8")
     return known_rig(path, None, folder)
+
+
+def record_first_motions(rig, folder, started):
+    """First motions of a twin in virtual time, kept as the bench keeps its runs; what they came to."""
+    run = prepared(first_motions(rig), folder)
+    end = run_in_process(run.order, paced=False)
+    write_report(run, end, started)
+    return run.ended(end)
 
 
 def hardware(rig, basis=None):

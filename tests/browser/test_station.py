@@ -11,11 +11,12 @@ import pytest
 
 from tests.browser.runs import SOON, felt, hardware, settled, station, twin
 from upright.basis import NOT_TRUSTED, Basis
-from upright.browser.hanging import write_swing_up
+from upright.browser.hanging import first_motions, write_swing_up
 from upright.browser.lease import PATIENCE
 from upright.browser.messages import ClientRequest
 from upright.browser.runs import listed, report_apart
 from upright.browser.station import obey
+from upright.control.exploration import SECONDS
 from upright.errors import BadInput
 from upright.realtime.process import BY_HAND, DEAF, run_in_process
 from upright.realtime.session import RunState
@@ -316,6 +317,27 @@ def test_a_swing_up_begins_where_the_rig_hangs_once_it_is_designed_and_keeps_its
     carry.go()
     assert made.described("operator")["from"] == "held"
     ask(made, "operator", "poles", poles=[-5.0, -6.0, -7.0, -8.0])
+
+
+def test_first_motions_begin_where_the_rig_hangs_and_are_no_feedback_of_states(at_work):
+    made, carry, _ = at_work
+    with pytest.raises(BadInput, match="hand"):
+        ask(made, "operator", "start", **{"from": "motions", "start": [0.0, 0.0, 0.05, 0.0]})
+    ask(made, "operator", "start", **{"from": "motions", "seconds": 600})
+    carry.go()
+    order = carry.orders[0]
+    assert (order.seconds, made.described("operator")["seconds"]) == (SECONDS, SECONDS)
+    assert order.make().supervisor.duty.at == "hanging"
+    with pytest.raises(BadInput, match="first motions run"):
+        ask(made, "operator", "poles", poles=[-5.0, -6.0, -7.0, -8.0])
+    assert made.described("operator")["from"] == "motions"
+
+
+def test_a_rig_that_has_no_first_motions_says_why(rig):
+    with pytest.raises(BadInput, match="stands beside it"):
+        first_motions(hardware(rig))
+    with pytest.raises(BadInput, match="hanging pendulum"):
+        first_motions(replace(rig, file=replace(rig.file, zero="inverted")))
 
 
 def test_a_rig_without_a_swing_up_says_why(rig, tmp_path):

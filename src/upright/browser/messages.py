@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 from upright.errors import BadInput, nearest
 from upright.realtime.reference import SHAPES
 
-HELD, HANGING = "held", "hanging"
-"""Where a run begins."""
+HELD, HANGING, MOTIONS = "held", "hanging", "motions"
+"""Where a run begins: held; hanging, to be swung up; hanging, to be moved for its identification."""
 LONGEST = 4096
 """Bytes of a message at most."""
 _STATES = 16
@@ -45,8 +45,8 @@ def _text(value: Any) -> str:
 
 
 def _where(value: Any) -> str:
-    if value not in (HELD, HANGING):
-        raise ValueError(f"'{HELD}' or '{HANGING}'")
+    if value not in (HELD, HANGING, MOTIONS):
+        raise ValueError(f"'{HELD}', '{HANGING}' or '{MOTIONS}'")
     return str(value)
 
 

@@ -30,7 +30,8 @@ def write_report(run: PreparedRun, end: RunEnd, started: float) -> str:
     chapter = run_chapter(result)
     write_html(result.log_path.with_suffix(".html"), chapter)
     seconds = float(result.t[-1]) if result.t.size else 0.0
-    facts = {"started": started, "seconds": seconds, "verdict": chapter.verdict}
+    what = "first motions" if run.request.exploration else "swing-up" if run.request.from_rest else "run"
+    facts = {"what": what, "started": started, "seconds": seconds, "verdict": chapter.verdict}
     replace_file(result.log_path.with_suffix(".json"), json.dumps(facts).encode())
     return chapter.verdict
 

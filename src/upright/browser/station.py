@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from upright.basis import NOT_TRUSTED
-from upright.browser.hanging import swing_up_apart
+from upright.browser.hanging import first_motions, swing_up_apart
 from upright.browser.lease import Lease
-from upright.browser.messages import HANGING, HELD, ClientRequest
+from upright.browser.messages import HANGING, HELD, MOTIONS, ClientRequest
 from upright.browser.rig import HARDWARE, TWIN, BenchRig
 from upright.browser.runs import report_apart
 from upright.errors import BadInput, UprightError, nearest
@@ -64,8 +64,8 @@ class Station:
         Whether no process has the rig.
     hanging : str
         Why it cannot be swung up from where it hangs, as a sentence; empty where it can.
-    from_hanging : bool
-        Whether the run, or the last one, began there.
+    origin : str
+        Where the run, or the last one, began: `HELD`, `HANGING` for a swing-up, `MOTIONS` to be identified.
     loop, requested : Loop or None
         The law that runs as state feedback, and the one that was asked for last; a swing-up is none.
     desk : Desk or None
@@ -86,7 +86,7 @@ class Station:
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
         self.last, self.over, self.desk = RunState(phase=""), True, None
         self.loop, self.requested = rig.loop, None
-        self.hanging, self.from_hanging, self._swing_up = NOT_DESIGNED, False, swing_up
+        self.hanging, self.origin, self._swing_up = NOT_DESIGNED, HELD, swing_up
         self._held_by: Array | None = None
         self._designer: threading.Thread | None = None
         self._accepted, self._fifo, self._ending = "", fifo, False
@@ -107,9 +107,9 @@ class Station:
                 self._designer.start()
 
     def start(
-        self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "", hanging: bool = False
+        self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "", origin: str = HELD
     ) -> None:
-        """Begin a run; where it is held, or from where it hangs.
+        """Begin a run, from one of the places that messages name.
 
         Raises
         ------
@@ -125,21 +125,27 @@ class Station:
             raise BadInput(f"a run takes more than 0 and at most {LONGEST:g} s, got {seconds:g} s.")
         if self.rig.kind == HARDWARE and self.rig.basis.level == NOT_TRUSTED and not accept.strip():
             raise BadInput(f"its model is not trusted: {self.rig.basis.sentence} Say why it runs all the same.")
-        if hanging and start:
+        if origin != HELD and start:
             raise BadInput("nobody's hand brings it away from where it hangs.")
-        if hanging and (why := self.hanging):
+        if origin == HANGING and (why := self.hanging):
             self.prepare()
             raise BadInput(why)
-        request = RunRequest(
-            rig=self.rig.rig_path, law=self._swing_path if hanging else self.rig.law_path, seconds=seconds,
-            tilt=0.0 if hanging else self._tilt(start), from_rest=hanging, accept=accept,
-            steered=self.rig.follows and not hanging,
-        )  # fmt: skip
+        if origin == MOTIONS:
+            request = first_motions(self.rig)
+            seconds = request.seconds
+        else:
+            swings = origin == HANGING
+            request = RunRequest(
+                rig=self.rig.rig_path, law=self._swing_path if swings else self.rig.law_path, seconds=seconds,
+                tilt=0.0 if swings else self._tilt(start), from_rest=swings, accept=accept,
+                steered=self.rig.follows and not swings,
+            )  # fmt: skip
         desk = Desk()
         with self._lock:
             self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
-            self.from_hanging = hanging  # before the desk, by which a new scene is made
-            self.last, self.desk, self.loop = RunState(phase="starting"), desk, None if hanging else self.rig.loop
+            self.origin = origin  # before the desk, by which a new scene is made
+            self.last, self.desk = RunState(phase="starting"), desk
+            self.loop = self.rig.loop if origin == HELD else None
             self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
         self._thread = threading.Thread(target=self._run, args=(request, desk), name=self.rig.name, daemon=True)
@@ -200,8 +206,9 @@ class Station:
         if self.rig.basis.level == NOT_TRUSTED and not self._accepted:
             raise BadInput(f"its model is not trusted: {self.rig.basis.sentence}")
         desk = self._running()
-        if self.from_hanging:
-            raise BadInput("a swing-up runs, which is no feedback of states alone; its poles stay as they are.")
+        if self.origin != HELD:
+            what = "a swing-up runs, which is" if self.origin == HANGING else "its first motions run, which are"
+            raise BadInput(f"{what} no feedback of states alone; its poles stay as they are.")
         loop = self.rig.with_poles(poles)
         if not desk.change(loop.law):
             raise BadInput("the last change is not answered yet.")
@@ -210,7 +217,7 @@ class Station:
     def follow(self, who: str, value: float, *, shape: str = STEP, period: float = 0.0) -> None:
         """Give the law another reference: a step, or a wave of a period [s]."""
         self._operated(who)
-        if not self.rig.follows or (self.from_hanging and not self.over):
+        if not self.rig.follows or (self.origin != HELD and not self.over):
             raise BadInput("its law follows no reference.")
         most = self.rig.model.travel
         if abs(value) > min(most, 1e3):
@@ -230,7 +237,7 @@ class Station:
     @property
     def gains(self) -> Array | None:
         """Of the feedback that holds it in this run, or in the last one; None where the law is no feedback."""
-        return self._held_by if self.from_hanging else None if self.loop is None else self.loop.K
+        return self._held_by if self.origin == HANGING else None if self.loop is None else self.loop.K
 
     @property
     def _swing_path(self) -> Path:
@@ -317,7 +324,7 @@ class Station:
             "time": last.time, "tick": last.tick, "late": last.late, "mode": last.mode.name,
             "faults": [text for fault, text in SENTENCES.items() if fault in last.faults],
             "seconds": self.seconds, "verdict": self.verdict, "hanging": self.hanging,
-            "from": HANGING if self.from_hanging else HELD,
+            "from": self.origin,
         }  # fmt: skip
 
 
@@ -345,7 +352,7 @@ def obey(station: Station, who: str, message: ClientRequest) -> None:
         case "rearm":
             station.rearm(who)
         case "start":
-            station.start(who, hanging=fields.pop("from", HELD) == HANGING, **fields)
+            station.start(who, origin=fields.pop("from", HELD), **fields)
         case "tap":
             station.tap(who, **fields)
         case "poles":
