@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 import tempfile
+import time
 from pathlib import Path
 
+from tests.browser.runs import record_first_motions, twin
 from tests.browser.students import PHONE, Server, browser, student
 
-NAMES = ("bench_run", "bench_design", "bench_track", "bench_phone")
+NAMES = ("bench_run", "bench_identify", "bench_design", "bench_track", "bench_phone")
 
 
 def take(folder: Path, server: Server) -> None:
@@ -45,8 +47,21 @@ def take(folder: Path, server: Server) -> None:
         one.leaves()
 
 
+def take_fit(folder: Path, server: Server) -> None:
+    """Identify, of first motions that are recorded already."""
+    with browser() as chromium, student(chromium, server, screen="identify") as one:
+        one.page.wait_for_selector("#fit-log option", state="attached")
+        one.page.click("#fit-begin")
+        one.reads("#fit-status", "The fit is written")
+        one.page.wait_for_selector("#fit-pictures canvas")
+        one.page.wait_for_timeout(500)
+        one.page.screenshot(path=folder / "bench_identify.png")
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as runs:
+        record_first_motions(twin(Path(runs)), Path(runs) / "furuta", started=time.time())
         opened = Server(Path(runs), fifo=True)
         take(Path(sys.argv[1]), opened)
+        take_fit(Path(sys.argv[1]), opened)
         opened.close()

@@ -17,7 +17,7 @@ from upright.rig.makes import make_rig
 
 pytestmark = pytest.mark.slow
 
-SCREENS = ("run", "design", "track", "runs")
+SCREENS = ("run", "identify", "design", "track", "runs")
 LIGHT = 400_000
 """Bytes of the first load at most (issue 25)."""
 COVERS = """() => { const box = document.getElementById('stop').getBoundingClientRect(), inset = 3;
@@ -74,6 +74,7 @@ def test_a_whole_session_by_keyboard_alone(server, chromium):
         one.reads("#operator", "You operate")
         page.wait_for_selector("#tab-design:not([hidden])")
         tab_to(page, "#tab-run")
+        page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowRight")
         one.reads("#share", r"\d+ of 200 rigs are stabilised")
         tab_to(page, ".pole[role=slider]")

@@ -47,11 +47,11 @@ def served(rig, tmp_path):
             carry.end()
 
 
-def got(bench, path, **how):
+def got(bench, path, wait=SOON, **how):
     """Status, headers and text of an answer."""
     asked = urllib.request.Request(bench.url + path, **how)
     try:
-        with urllib.request.urlopen(asked, timeout=SOON) as answer:
+        with urllib.request.urlopen(asked, timeout=wait) as answer:
             return answer.status, answer.headers, answer.read().decode()
     except urllib.error.HTTPError as refused:
         return refused.code, refused.headers, refused.read().decode()

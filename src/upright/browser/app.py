@@ -19,6 +19,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
 from upright.browser.hub import Hub
+from upright.browser.identify.fits import Fits
+from upright.browser.identify.routes import routes as identify_routes
 from upright.browser.messages import ClientRequest, read
 from upright.browser.outbox import Outbox
 from upright.browser.runs import in_own_process, listed
@@ -57,6 +59,7 @@ def is_built() -> bool:
 def application(stations: Sequence[Station]) -> Starlette:
     """The bench of some rigs."""
     hubs = {station.rig.name: Hub(station) for station in stations}
+    fits = {name: Fits(hub.station.rig, hub.station.folder) for name, hub in hubs.items()}
     scripts: dict[str, asyncio.Task[str]] = {}
 
     async def page(_: Request) -> Response:
@@ -124,6 +127,8 @@ def application(stations: Sequence[Station]) -> Starlette:
     async def life(_: Starlette) -> AsyncGenerator[None]:
         pumping = asyncio.create_task(pump())
         yield
+        for each in fits.values():
+            each.close()
         pumping.cancel()
         with suppress(asyncio.CancelledError):
             await pumping
@@ -134,6 +139,7 @@ def application(stations: Sequence[Station]) -> Starlette:
             Route("/", page), Route("/assets/{name}", asset), Route("/api/rigs", rigs),
             Route("/api/rigs/{name}/runs", runs), Route("/rigs/{name}/twin.js", script),
             Route("/rigs/{name}/runs/{file}", result), WebSocketRoute("/live/{name}", live),
+            *identify_routes(hubs, fits),
         ],
     )  # fmt: skip
 

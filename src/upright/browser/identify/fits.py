@@ -1,0 +1,192 @@
+"""Logs of a rig, its own and those that somebody brought, and what was identified from them: kept in its folder."""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from upright.browser.identify.bounded import Bounded
+from upright.browser.identify.tasks import identify_log, inspect_log
+from upright.browser.rig import BenchRig
+from upright.browser.runs import listed
+from upright.errors import BadInput, UprightError
+from upright.files import replace_file
+
+LARGEST = 20 << 20
+"""Bytes of a log that somebody brings."""
+MOST = 50
+"""Logs that somebody brought, at most."""
+READING, FITTING, GRACE = 120.0, 900.0, 120.0
+"""Time for reading such a log; for a fit until it is interrupted; and for it to write what it has [s]."""
+OWN, COLUMNS = "rig", "columns"
+"""Who says what a log is of: what is known of the rig, or its columns."""
+
+Facts = dict[str, Any]
+
+
+class Fits:
+    """What can be identified at a rig.
+
+    Parameters
+    ----------
+    carry : callable
+        Makes a `Bounded`.
+    """
+
+    def __init__(self, rig: BenchRig, folder: Path, carry: Callable[..., Bounded] = Bounded) -> None:
+        self._rig, self._folder, self._carry = rig, folder, carry
+        self._lock = threading.Lock()
+        self._reading = threading.Lock()
+        self._job: Bounded | None = None
+        self._now: Facts | None = None
+        self._failed = ""
+
+    def keep(self, name: str, data: bytes) -> Facts:
+        """Keep a log, once a reader has read it.
+
+        Raises
+        ------
+        BadInput
+            What the reader says; or when there are too many already, or another one is being read.
+        """
+        name = called(name)
+        if len(data) > LARGEST:
+            raise BadInput(f"'{name}' has more than {LARGEST >> 20} MB; cut it, or use `upright identify` on it.")
+        if not self._reading.acquire(blocking=False):
+            raise BadInput("another log is being read; try again when it is there.")
+        try:
+            folder = self._folder / "uploads"
+            taken = [int(p.stem.partition("-")[2]) for p in folder.glob("log-*.json")]
+            if len(taken) >= MOST:
+                raise BadInput(f"{MOST} logs were brought already; remove some of {folder} where the bench runs.")
+            folder.mkdir(parents=True, exist_ok=True)
+            key = f"log-{max(taken, default=0) + 1}"
+            path = folder / f"{key}.log"
+            path.write_bytes(data)
+            try:
+                text = self._carry(inspect_log, path, name, seconds=READING).run()
+            except BaseException:
+                path.unlink()
+                raise
+            facts = {"id": key, "name": name, "brought": time.time(), **json.loads(text)}
+            replace_file(folder / f"{key}.json", json.dumps(facts).encode())
+            return facts
+        finally:
+            self._reading.release()
+
+    def logs(self) -> list[Facts]:
+        """Logs that can be identified, those of the rig first, the newest first of each."""
+        runs = [
+            {"id": run["id"], "own": True, "name": run.get("what", "run"), "started": run["started"],
+             "seconds": run["seconds"]}
+            for run in listed(self._folder, self._rig.name) if "log" in run
+        ]  # fmt: skip
+        brought = [_read(path) for path in (self._folder / "uploads").glob("log-*.json")]
+        return runs + [{**b, "own": False} for b in sorted(brought, key=lambda b: -b["brought"])]
+
+    def begin(self, log: str, of: str) -> None:
+        """Begin to identify a log.
+
+        Raises
+        ------
+        BadInput
+            When there is no such log, or another one is being identified.
+        """
+        known = next((each for each in self.logs() if each["id"] == log), None)
+        if known is None:
+            raise BadInput("there is no such log; load the page again.")
+        path = self._folder / (f"{log}.mcap" if known["own"] else f"uploads/{log}.log")
+        name = f"{log}.mcap" if known["own"] else known["name"]
+        with self._lock:
+            if self._now is not None:
+                raise BadInput("another log is being identified; wait, or interrupt it.")
+            taken = [int(p.name.partition("-")[2]) for p in (self._folder / "fits").glob("fit-*")]
+            key = f"fit-{max(taken, default=0) + 1}"
+            rig = self._rig.rig_path if known["own"] or of == OWN else None
+            self._job = self._carry(
+                identify_log, path, name, rig, self._folder / "fits" / key, seconds=FITTING, grace=GRACE,
+                progress=self._progress,
+            )  # fmt: skip
+            self._failed = ""
+            self._now = {"id": key, "log": log, "name": _name(known), "step": "starting", "since": time.time()}
+        threading.Thread(target=self._run, args=(self._job, dict(self._now)), name=key, daemon=True).start()
+
+    def interrupt(self) -> None:
+        """Let the fit that is on its way end with what it has.
+
+        Raises
+        ------
+        BadInput
+            When there is none.
+        """
+        with self._lock:
+            if self._job is None or self._now is None:
+                raise BadInput("nothing is being identified.")
+            self._now["step"] = "ending with the best so far"
+            self._job.interrupt()
+
+    def described(self) -> Facts:
+        """Logs, the fit that is on its way and those that are written, as JSON holds them."""
+        with self._lock:
+            now = None if self._now is None else {**self._now, "seconds": time.time() - self._now["since"]}
+            failed = self._failed
+        return {"logs": self.logs(), "now": now, "failed": failed, "fits": self.listed()}
+
+    def listed(self) -> list[Facts]:
+        """Fits that are written, the newest first."""
+        known = [_read(path) for path in (self._folder / "fits").glob("fit-*/fit-*.json")]
+        return sorted(known, key=lambda fit: -fit["since"])
+
+    def file(self, key: str, name: str) -> Path | None:
+        """A file of a fit that is written."""
+        there = any(fit["id"] == key for fit in self.listed())
+        path = self._folder / "fits" / key / name
+        return path if there and path.is_file() else None
+
+    def close(self) -> None:
+        """End what is on its way."""
+        if self._job is not None:
+            self._job.kill()
+
+    def _progress(self, step: str, share: float) -> None:
+        with self._lock:
+            if self._now is not None:
+                self._now["step"] = step
+
+    def _run(self, job: Bounded, now: Facts) -> None:
+        failed = ""
+        try:
+            verdict = job.run()
+            kept = {**{n: now[n] for n in ("id", "log", "name", "since")}, "verdict": verdict}
+            replace_file(self._folder / "fits" / now["id"] / f"{now['id']}.json", json.dumps(kept).encode())
+        except UprightError as error:
+            failed = str(error)
+        except BaseException:
+            failed = "it failed by a fault of the program; see what the server printed."
+            raise
+        finally:
+            with self._lock:
+                self._now, self._job, self._failed = None, None, failed[:1].upper() + failed[1:]
+
+
+def called(name: str) -> str:
+    """What a file is called, for sentences only; never a path."""
+    last = re.split(r"[/\\]", name)[-1]
+    return "".join(c for c in last if c.isprintable())[:100].strip() or "log"
+
+
+def _name(log: Facts) -> str:
+    if not log["own"]:
+        return str(log["name"])
+    return f"{log['name']} of {datetime.fromtimestamp(log['started']):%d %b %Y, %H:%M:%S}"
+
+
+def _read(path: Path) -> Facts:
+    facts: Facts = json.loads(path.read_text(encoding="utf-8"))
+    return facts

@@ -1,0 +1,137 @@
+"""What the bench answers about logs and fits: a log is brought, a fit begun and interrupted by the operator alone."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+
+from upright.browser.hub import Hub
+from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Fits
+from upright.browser.messages import LONGEST
+from upright.errors import BadInput, UprightError
+
+WHO = "x-bench-me"
+"""Header by which a page says who it is; no page of another site can send it."""
+SLOWEST = 120.0
+"""Time for a log to come [s]."""
+FILES = {"html": ("report.html", "text/html"), "json": ("facts.json", "application/json"),
+         "fit": ("fit.json", "application/json")}  # fmt: skip
+"""By the ending of an address."""
+
+Answering = Callable[[Request], Awaitable[Response]]
+
+
+def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Fits]) -> list[Route]:
+    """The addresses of some rigs."""
+
+    async def described(request: Request) -> Response:
+        own = fits.get(request.path_params["name"])
+        return _nothing() if own is None else JSONResponse(await asyncio.to_thread(own.described))
+
+    async def written(request: Request) -> Response:
+        own = fits.get(request.path_params["name"])
+        key, _, end = request.path_params["file"].rpartition(".")
+        if own is None or end not in FILES or (path := own.file(key, FILES[end][0])) is None:
+            return _nothing()
+        if end == "html":  # a report has a policy of its own
+            headers = {"content-security-policy": "frame-ancestors 'self'"}
+            return FileResponse(path, media_type=FILES[end][1], headers=headers)
+        name = f"{request.path_params['name']}-{key}.json" if end == "fit" else None
+        return FileResponse(path, media_type=FILES[end][1], filename=name)
+
+    def for_operator(answer: Callable[[Request, Fits], Awaitable[Response]]) -> Answering:
+        async def checked(request: Request) -> Response:
+            name = request.path_params["name"]
+            if name not in hubs:
+                return _nothing()
+            try:
+                _operates(hubs[name], request.headers.get(WHO, ""))
+                return await answer(request, fits[name])
+            except UprightError as error:
+                await _rest(request)
+                text = str(error)
+                return PlainTextResponse(text[:1].upper() + text[1:], status_code=400)
+            except ClientDisconnect:
+                return _nothing()
+
+        return checked
+
+    async def bring(request: Request, own: Fits) -> Response:
+        data = await _body(request, LARGEST, f"a log of at most {LARGEST >> 20} MB")
+        name = request.query_params.get("name", "")
+        return JSONResponse(await asyncio.to_thread(own.keep, name, data))
+
+    async def begin(request: Request, own: Fits) -> Response:
+        log, of = _wanted(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
+        await asyncio.to_thread(own.begin, log, of)
+        return JSONResponse({})
+
+    async def interrupt(_: Request, own: Fits) -> Response:
+        own.interrupt()
+        return JSONResponse({})
+
+    return [
+        Route("/api/rigs/{name}/fits", described, methods=["GET"]),
+        Route("/api/rigs/{name}/fits", for_operator(begin), methods=["POST"]),
+        Route("/api/rigs/{name}/fits", for_operator(interrupt), methods=["DELETE"]),
+        Route("/api/rigs/{name}/logs", for_operator(bring), methods=["POST"]),
+        Route("/rigs/{name}/fits/{file}", written, methods=["GET"]),
+    ]
+
+
+def _wanted(text: bytes) -> tuple[str, str]:
+    """Which log a fit is to be of, and who says what rig it was."""
+    try:
+        content: Any = json.loads(text)
+        log, of = content["log"], content["of"]
+    except (ValueError, RecursionError, KeyError, TypeError):
+        log, of = None, None
+    if not isinstance(log, str) or of not in (OWN, COLUMNS):
+        raise BadInput(f'a fit is begun by {{"log": "run", "of": "{OWN}"}}, or of its "{COLUMNS}".')
+    return log, of
+
+
+def _operates(hub: Hub, who: str) -> None:
+    """Refuse everybody but the operator, whom the first one becomes who is at a page here."""
+    if who not in hub.clients.values():
+        raise BadInput("this is for the page of this bench; open it.")
+    if not hub.station.lease.take(who):
+        raise BadInput("somebody else operates it.")
+
+
+async def _rest(request: Request) -> None:
+    """Take what a client still sends of a refused request: who is sending hears no answer."""
+    came = 0
+    with suppress(ClientDisconnect, TimeoutError, RuntimeError):
+        async with asyncio.timeout(SLOWEST):
+            async for chunk in request.stream():
+                came += len(chunk)
+                if came > LARGEST:
+                    return
+
+
+async def _body(request: Request, most: int, what: str) -> bytes:
+    length = request.headers.get("content-length", "0")
+    if not length.isdecimal() or len(length) > 12 or int(length) > most:
+        raise BadInput(f"this takes {what}.")
+    data = bytearray()
+    try:
+        async with asyncio.timeout(SLOWEST):
+            async for chunk in request.stream():
+                data += chunk
+                if len(data) > most:
+                    raise BadInput(f"this takes {what}.")
+    except TimeoutError:
+        raise BadInput(f"it did not come within {SLOWEST:g} s.") from None
+    return bytes(data)
+
+
+def _nothing() -> Response:
+    return PlainTextResponse("There is nothing here.", status_code=404)

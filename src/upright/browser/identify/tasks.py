@@ -1,0 +1,19 @@
+"""What a process of its own does with a log, by names that cost the server nothing: each imports where it runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def inspect_log(*arguments: Any) -> str:
+    """See `reading.inspect_log`."""
+    from upright.browser.identify import reading
+
+    return reading.inspect_log(*arguments)
+
+
+def identify_log(*arguments: Any) -> str:
+    """See `work.identify_log`."""
+    from upright.browser.identify import work
+
+    return work.identify_log(*arguments)
