@@ -182,7 +182,8 @@ export class Design {
     if (!scene || this.share === undefined) return;
     const few = this.share < ENOUGH, { level, sentence } = scene.basis;
     const idle = this.session.state?.state !== "running" ? "Start the rig to apply: gains are changed while it runs." : "";
-    const swing = this.session.state?.from === "hanging" ? "A swing-up runs, whose poles stay as they are. Start held upright to change them." : "";
+    const from = this.session.state?.from ?? "held", what = from === "hanging" ? "A swing-up runs, whose" : "First motions run, whose";
+    const swing = from === "held" ? "" : `${what} poles stay as they are. Start held upright to change them.`;
     const why = unsteerable || idle || swing || (few ? "Apply is locked: fewer than 95 % of the rigs are stabilised. Slow the fast poles down, or give them more damping." : "");
     badge.className = `badge ${few || level === "not trusted" ? "no" : level === "trusted" ? "ok" : "care"}`;
     say(badge, few ? "not supported" : level);

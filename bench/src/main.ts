@@ -3,6 +3,7 @@
 import { Bar, isPhone, message } from "./bar";
 import { Design } from "./design";
 import { byId, make } from "./dom";
+import { Identify } from "./identify";
 import { Run } from "./run";
 import { Runs } from "./runs";
 import { Session } from "./session";
@@ -13,7 +14,7 @@ interface Listed {
   title: string;
 }
 
-const SCREENS = ["run", "design", "track", "runs"] as const;
+const SCREENS = ["run", "identify", "design", "track", "runs"] as const;
 type Screen = (typeof SCREENS)[number];
 
 const AGAIN = 1000; // ms
@@ -70,10 +71,18 @@ async function bench(): Promise<void> {
       bar.show();
       design?.gate();
       track.gate();
+      if (identify.visible) {
+        if (before?.verdict !== state?.verdict) void identify.show();
+        else identify.state();
+      }
     },
     message,
   });
   const run = new Run(session), runs = new Runs(session), track = new Track(session);
+  const identify = new Identify(session, () => {
+    byId<HTMLSelectElement>("from").value = "motions";
+    run.start();
+  });
   const bar = new Bar(session, { start: () => run.start(), tap: () => run.tap() });
   const show = (asked: string | undefined) => {
     const screen: Screen = (!isPhone() && SCREENS.find((s) => s === asked && !byId(`tab-${s}`).hidden)) || "run";
@@ -85,6 +94,7 @@ async function bench(): Promise<void> {
     history.replaceState(null, "", `#/${encodeURIComponent(name)}/${screen}`);
     if (screen === "runs") void runs.show();
     if (screen === "track") track.shown();
+    if (screen === "identify") identify.opened();
   };
   /** Shows the tab of a screen that this rig has; the screen itself where the address asked for it. */
   const offer = (screen: Screen, there: boolean) => {

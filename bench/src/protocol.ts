@@ -50,7 +50,7 @@ export interface State {
   /** Why it cannot be swung up from where it hangs; "" where it can. */
   hanging: string;
   /** Where the run, or the last one, began. */
-  from: "held" | "hanging";
+  from: "held" | "hanging" | "motions";
 }
 
 export type ServerMessage =

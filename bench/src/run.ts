@@ -3,6 +3,7 @@
 import { byId, field, italic, make, say } from "./dom";
 import { spoken } from "./plane";
 import { grouped } from "./poles";
+import type { State } from "./protocol";
 import type { Session } from "./session";
 import { about, drawStrip, limited } from "./strip";
 import { short, shownUnit, signed, significant, symbol } from "./words";
@@ -50,10 +51,10 @@ export class Run {
 
   start(): void {
     const { tilt, seconds, session } = this, begin = byId<HTMLSelectElement>("from");
-    const from = !begin.hidden && begin.value === "hanging" ? "hanging" : "held";
+    const from = begin.hidden ? "held" : (begin.value as State["from"]);
     const away = tilt && DATA.away.map(() => 0);
     if (away) away[away.length - 2] = tilt.valueAsNumber / shownUnit(DATA.coordinates.at(-1)!.unit).scale;
-    session.steer({ do: "start", ...(from === "hanging" ? { from } : away ? { start: away } : {}), ...(seconds ? { seconds: seconds.valueAsNumber } : {}), ...(this.reason?.value ? { accept: this.reason.value } : {}) });
+    session.steer({ do: "start", ...(from !== "held" ? { from } : away ? { start: away } : {}), ...(seconds ? { seconds: seconds.valueAsNumber } : {}), ...(this.reason?.value ? { accept: this.reason.value } : {}) });
   }
 
   tap(side = 1): void {

@@ -1,0 +1,262 @@
+// Screen Identify: a log, its fit as it goes, what it came to.
+
+import { lock } from "./bar";
+import { type Curve, drawCurves } from "./curves";
+import { byId, italic, make, say } from "./dom";
+import type { Session } from "./session";
+import { short, shownUnit, symbol } from "./words";
+
+interface Log {
+  id: string;
+  /** Whether this rig was logged here; else somebody brought it. */
+  own: boolean;
+  name: string;
+  seconds: number;
+  /** Seconds since 1970, of a run. */
+  started?: number;
+  rows?: number;
+  columns?: string[];
+}
+
+interface Fitted {
+  id: string;
+  name: string;
+  since: number;
+  verdict: string;
+}
+
+interface Identified {
+  logs: Log[];
+  now: { id: string; name: string; step: string; seconds: number } | null;
+  failed: string;
+  fits: Fitted[];
+}
+
+interface Facts {
+  verdict: string;
+  sound: boolean;
+  interrupted: boolean;
+  warnings: string[];
+  windows: string[];
+  rests: string[];
+  plant: string;
+  assessments: { question: string; state: string; tone: string; why: string }[];
+  parameters: { symbol: string; meaning: string; value: string; interval: string; unit: string; status: string; tone: string }[];
+  curves: {
+    run: string; role: "fit" | "predict"; signal: string; unit: string; meaning: string; fit: string; from: number;
+    ahead: number; measured: Curve; predicted: Curve;
+  }[];
+}
+
+const SOON = 500, LATER = 3000, LARGEST = 20; // ms, MB
+const RUNS = "The rig runs already.";
+const UNSENT = "The log could not be sent: there is no connection to the bench.";
+
+/** Name of a parameter as it is printed, what stands behind the first low line below it. */
+function printed(name: string): (Node | string)[] {
+  if (name.includes(".")) return [name.split(".").at(-1)!];
+  const [stem = "", ...below] = name.split("_");
+  return below.length ? [italic(symbol(stem)), make("sub", {}, below.join(" "))] : [italic(symbol(stem))];
+}
+
+const when = (seconds: number): string => new Date(1000 * seconds).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "medium" });
+const sentence = (text: string): string => text[0]!.toUpperCase() + text.slice(1);
+
+export class Identify {
+  private readonly address: string;
+  private identified: Identified | undefined;
+  private facts: Facts | undefined;
+  /** Fit that is shown, and the log that is to be chosen once it is listed. */
+  private shown = "";
+  private wanted = "";
+  private timer = 0;
+  private busy = "";
+
+  constructor(private readonly session: Session, record: () => void) {
+    this.address = `/api/rigs/${encodeURIComponent(session.name)}`;
+    const press = (id: string, act: () => void) =>
+      byId(id).addEventListener("click", ({ currentTarget }) => {
+        const why = (currentTarget as HTMLElement).dataset["why"];
+        if (why) this.say(why);
+        else act();
+      });
+    press("fit-begin", () => void this.begin());
+    press("fit-interrupt", () => void this.order("DELETE", "fits"));
+    press("fit-report", () => this.report());
+    press("fit-motions", record);
+    byId("fit-log").addEventListener("change", () => this.about());
+    byId("fit-file").addEventListener("change", ({ currentTarget }) => {
+      const input = currentTarget as HTMLInputElement, file = input.files?.[0];
+      if (file) void this.bring(file).finally(() => (input.value = ""));
+    });
+    byId("fit-list").addEventListener("change", () => void this.open(byId<HTMLSelectElement>("fit-list").value));
+    byId<HTMLIFrameElement>("fit-frame").addEventListener("load", ({ currentTarget }) => {
+      (currentTarget as HTMLIFrameElement).contentWindow?.addEventListener("keydown", (event) => {
+        if (event.key === "Escape") session.stop();
+      }, { capture: true });
+    });
+    const redraw = () => this.draw();
+    addEventListener("resize", redraw);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  }
+
+  get visible(): boolean {
+    return !byId("identify").hidden;
+  }
+
+  /** What is known now; again soon while a fit goes on, and now and then while the screen is looked at. */
+  async show(): Promise<void> {
+    clearTimeout(this.timer);
+    const answer = await fetch(`${this.address}/fits`).catch(() => undefined);
+    const before = this.identified;
+    if (answer?.ok) {
+      this.identified = (await answer.json()) as Identified;
+      this.lists(before);
+      const { now, failed, fits } = this.identified;
+      if (before?.now && !now) this.ended(failed, fits[0]);
+      else if (!this.shown && fits[0]) await this.open(fits[0].id);
+    }
+    this.state();
+    clearTimeout(this.timer);
+    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now ? SOON : LATER);
+  }
+
+  /** What may be pressed now. */
+  state(): void {
+    const { session, identified, busy } = this, now = identified?.now, chosen = byId<HTMLSelectElement>("fit-log").value;
+    lock(byId("fit-begin"), session.unsteerable || busy || (now ? "A log is being identified." : chosen ? "" : "There is no log yet: record one, or bring one."));
+    byId("fit-record").hidden = byId("from").hidden;
+    lock(byId("fit-motions"), session.unsteerable || ({ stopped: "The rig is stopped; rearm it first.", starting: RUNS, running: RUNS } as Record<string, string>)[session.state?.state ?? ""] || "");
+    byId("fit-interrupt").hidden = !now;
+    byId("fit-begin").hidden = !!now;
+    lock(byId("fit-interrupt"), session.unsteerable);
+    byId<HTMLInputElement>("fit-file").disabled = session.unsteerable !== "" || busy !== "";
+    byId("fit-going").hidden = !now;
+    if (now) {
+      say(byId("fit-step"), `${now.step}, ${now.seconds.toFixed(0)} s`);
+      this.say(`Identifying ${now.name}.`);
+    }
+  }
+
+  private say(text: string): void {
+    say(byId("fit-status"), text);
+  }
+
+  private ended(failed: string, newest: Fitted | undefined): void {
+    this.say(failed || "The fit is written.");
+    if (!failed && newest) void this.open(newest.id);
+  }
+
+  private lists(before: Identified | undefined): void {
+    const { logs, fits } = this.identified!;
+    if (JSON.stringify(before?.logs) !== JSON.stringify(logs)) {
+      const select = byId<HTMLSelectElement>("fit-log"), chosen = this.wanted || select.value;
+      const group = (label: string, own: boolean) => {
+        const options = logs.filter((log) => log.own === own).map((log) => make("option", { value: log.id }, own ? `${sentence(log.name)} of ${when(log.started!)}, ${log.seconds.toFixed(1)} s` : log.name));
+        return options.length ? [make("optgroup", { label }, ...options)] : [];
+      };
+      select.replaceChildren(...group("Runs of this rig", true), ...group("Brought", false));
+      const fresh = before && logs.find((log) => log.own && !before.logs.some((old) => old.own && old.id === log.id));
+      if (fresh || logs.some((log) => log.id === chosen)) select.value = fresh?.id ?? chosen;
+      this.wanted = "";
+      select.disabled = logs.length === 0;
+      byId("no-logs").hidden = logs.length > 0;
+      this.about();
+    }
+    if (JSON.stringify(before?.fits) !== JSON.stringify(fits)) {
+      byId("fit-list").replaceChildren(...fits.map((fit) => make("option", { value: fit.id }, `${sentence(fit.name)}, fitted ${when(fit.since)}`)));
+      byId<HTMLSelectElement>("fit-list").value = this.shown;
+      byId("fits").hidden = fits.length === 0;
+    }
+  }
+
+  private about(): void {
+    const log = this.identified?.logs.find((each) => each.id === byId<HTMLSelectElement>("fit-log").value);
+    byId("fit-kind").hidden = !log || log.own;
+    const rows = log?.rows === undefined ? "" : `${log.rows.toLocaleString("en-GB")} rows in ${log.seconds.toPrecision(3)} s: ${log.columns!.join(", ")}.`;
+    say(byId("fit-about"), !log ? "" : log.own ? "The bench knows this rig: what a scale and a ruler tell of it is given, the rest is estimated." : rows);
+    this.state();
+  }
+
+  private async order(method: string, what: string, body?: BodyInit): Promise<Response | undefined> {
+    const headers = { "x-bench-me": this.session.scene?.you ?? "" };
+    const answer = await fetch(`${this.address}/${what}`, { method, headers, ...(body === undefined ? {} : { body }) }).catch(() => undefined);
+    if (!answer) this.say(UNSENT);
+    else if (!answer.ok) this.say(await answer.text());
+    return answer?.ok ? answer : undefined;
+  }
+
+  private async bring(file: File): Promise<void> {
+    if (file.size > LARGEST << 20) return this.say(`${file.name} has more than ${LARGEST} MB; cut it, or use upright identify on it.`);
+    this.busy = "A log is being read.";
+    this.say(`Reading ${file.name}.`);
+    this.state();
+    const answer = await this.order("POST", `logs?name=${encodeURIComponent(file.name)}`, file);
+    this.busy = "";
+    if (answer) {
+      const log = (await answer.json()) as Log;
+      this.wanted = log.id;
+      this.say(`${log.name} is there.`);
+    }
+    await this.show();
+  }
+
+  private async begin(): Promise<void> {
+    const log = byId<HTMLSelectElement>("fit-log").value, own = byId("fit-kind").hidden;
+    const of = own ? "rig" : byId<HTMLSelectElement>("fit-of").value;
+    if (await this.order("POST", "fits", JSON.stringify({ log, of }))) await this.show();
+  }
+
+  private async open(id: string): Promise<void> {
+    const answer = await fetch(`/rigs/${encodeURIComponent(this.session.name)}/fits/${id}.json`).catch(() => undefined);
+    if (!answer?.ok) return;
+    this.facts = (await answer.json()) as Facts;
+    this.shown = id;
+    byId<HTMLSelectElement>("fit-list").value = id;
+    byId("fit-report-panel").hidden = true;
+    this.build(this.facts);
+  }
+
+  private build(facts: Facts): void {
+    byId("fit-result").hidden = false;
+    byId("fit-curves").hidden = false;
+    const [headline = "", ...rest] = facts.verdict.split(/(?<=\.) (?=[A-Z])/);
+    say(byId("fit-verdict"), headline);
+    byId("fit-verdict").className = `share ${facts.sound ? "sound" : "unsound"}`;
+    say(byId("fit-more"), rest.join(" "));
+    byId("fit-questions").replaceChildren(...facts.assessments.map((a) => make("li", {}, make("span", { class: `badge ${a.tone}` }, a.state), ` ${a.question} `, make("span", { class: "why" }, a.why))));
+    byId("fit-rows").replaceChildren(...facts.parameters.map((p) => make("tr", {},
+      make("th", { scope: "row" }, make("span", { class: "name" }, ...printed(p.symbol)), " ", make("span", { class: "meaning" }, p.meaning)),
+      make("td", { class: "number" }, `${p.value} ${p.unit}`, make("span", { class: "meaning" }, p.interval)),
+      make("td", {}, make("span", { class: `badge ${p.tone}` }, p.status)))));
+    byId("fit-rests").replaceChildren(...[...facts.rests, ...facts.warnings, ...facts.windows].map((text) => make("li", {}, text)));
+    byId<HTMLAnchorElement>("fit-file-link").href = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.fit`;
+    byId("fit-pictures").replaceChildren(...facts.curves.flatMap((curve) => {
+      const { unit } = shownUnit(curve.unit), name = short(curve.meaning), how = curve.ahead ? `, ${curve.ahead} s ahead` : "";
+      const title = make("h3", {}, italic(symbol(curve.signal)), ` ${name} `, make("span", { class: "unit" }, `[${unit}], ${curve.role === "fit" ? "fitted" : "predicted"}${how}: ${curve.fit}`));
+      return [make("div", { class: "curve" }, title, make("canvas", { role: "img", "aria-label": `${name}, measured and by the model; ${curve.fit} explained` }))];
+    }));
+    byId("fit-tested").hidden = !facts.curves.some((curve) => curve.role === "predict");
+    this.draw();
+  }
+
+  private draw(): void {
+    if (!this.visible || !this.facts) return;
+    document.querySelectorAll<HTMLCanvasElement>("#fit-pictures canvas").forEach((canvas, k) => {
+      const curve = this.facts!.curves[k]!;
+      drawCurves(canvas, { ...curve, from: curve.role === "predict" ? curve.from : 0, scale: shownUnit(curve.unit).scale, colour: `--q${k % 4}` });
+    });
+  }
+
+  /** Draws what could not be drawn while it was hidden. */
+  opened(): void {
+    this.draw();
+    void this.show();
+  }
+
+  private report(): void {
+    byId("fit-report-panel").hidden = false;
+    byId<HTMLIFrameElement>("fit-frame").src = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.html`;
+    byId("fit-report-panel").scrollIntoView();
+  }
+}
