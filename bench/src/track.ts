@@ -200,7 +200,7 @@ export class Track {
   gate(): void {
     const { scene, state, unsteerable } = this.session, badge = byId("track-badge");
     if (scene?.tracked === undefined) return;
-    const here = unsteerable || (state?.state !== "running" ? "Start the rig: a reference is followed while it runs." : state.from === "hanging" ? "A swing-up runs, which follows no reference. Start held to follow one." : "");
+    const here = unsteerable || (state?.state !== "running" ? "Start the rig: a reference is followed while it runs." : state.from === "hanging" ? "A swing-up runs, which follows no reference. Start held to follow one." : state.from === "motions" ? "First motions run, which follow no reference. Start held to follow one." : "");
     badge.className = `badge ${this.outcome ? "no" : "ok"}`;
     say(badge, this.outcome ? "not supported" : "within limits");
     say(byId("track-gate"), this.outcome || here || "The model follows within its limits.");

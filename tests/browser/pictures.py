@@ -55,7 +55,7 @@ def take_fit(folder: Path, server: Server) -> None:
         one.reads("#fit-status", "The fit is written")
         one.page.wait_for_selector("#fit-pictures canvas")
         one.page.wait_for_timeout(500)
-        one.page.screenshot(path=folder / "bench_identify.png")
+        one.page.screenshot(path=folder / "bench_identify.png", clip={"x": 0, "y": 0, "width": 1280, "height": 620})
 
 
 if __name__ == "__main__":
