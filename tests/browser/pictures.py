@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from io import BytesIO
 from pathlib import Path
+
+from PIL import Image
 
 from tests.browser.runs import record_first_motions, twin
 from tests.browser.students import PHONE, Server, browser, student
@@ -55,7 +58,8 @@ def take_fit(folder: Path, server: Server) -> None:
         one.reads("#fit-status", "The fit is written")
         one.page.wait_for_selector("#fit-pictures canvas")
         one.page.wait_for_timeout(500)
-        one.page.screenshot(path=folder / "bench_identify.png", clip={"x": 0, "y": 0, "width": 1280, "height": 620})
+        picture = Image.open(BytesIO(one.page.screenshot()))
+        picture.quantize(128, dither=Image.Dither.NONE).save(folder / "bench_identify.png", optimize=True)
 
 
 if __name__ == "__main__":

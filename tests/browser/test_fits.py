@@ -9,7 +9,7 @@ import pytest
 
 from tests.browser.runs import SOON, settled, twin
 from tests.browser.test_served import Client, client, got
-from upright.browser.identify.fits import LARGEST, MOST, OWN, Fits, called
+from upright.browser.identify.fits import LARGEST, MOST, OWN, Identifications, shown_name
 from upright.browser.identify.routes import WHO
 from upright.browser.serve import Bench
 from upright.errors import BadInput
@@ -60,7 +60,7 @@ def bench(rig, tmp_path_factory):
 @pytest.fixture
 def made(rig, tmp_path):
     carry = ByHand()
-    return Fits(rig, tmp_path, carry), carry, tmp_path
+    return Identifications(rig, tmp_path, carry), carry, tmp_path
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def made(rig, tmp_path):
 )  # fmt: skip
 def test_a_name_is_for_sentences_and_never_a_path(made, name, kept):
     fits, _, folder = made
-    assert called(name) == fits.keep(name, b"1 2")["name"] == kept
+    assert shown_name(name) == fits.keep(name, b"1 2")["name"] == kept
     assert sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()) == [
         "uploads/log-1.json", "uploads/log-1.log",
     ]  # fmt: skip

@@ -19,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
 from upright.browser.hub import Hub
-from upright.browser.identify.fits import Fits
+from upright.browser.identify.fits import Identifications
 from upright.browser.identify.routes import routes as identify_routes
 from upright.browser.messages import ClientRequest, read
 from upright.browser.outbox import Outbox
@@ -59,7 +59,7 @@ def is_built() -> bool:
 def application(stations: Sequence[Station]) -> Starlette:
     """The bench of some rigs."""
     hubs = {station.rig.name: Hub(station) for station in stations}
-    fits = {name: Fits(hub.station.rig, hub.station.folder) for name, hub in hubs.items()}
+    fits = {name: Identifications(hub.station.rig, hub.station.folder) for name, hub in hubs.items()}
     scripts: dict[str, asyncio.Task[str]] = {}
 
     async def page(_: Request) -> Response:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.browser.identify.bounded import Bounded
-from upright.browser.identify.tasks import identify_log, inspect_log
+from upright.browser.identify.tasks import begin_identification, begin_inspection
 from upright.browser.rig import BenchRig
 from upright.browser.runs import listed
 from upright.errors import BadInput, UprightError
@@ -30,7 +30,7 @@ OWN, COLUMNS = "rig", "columns"
 Facts = dict[str, Any]
 
 
-class Fits:
+class Identifications:
     """What can be identified at a rig.
 
     Parameters
@@ -55,7 +55,7 @@ class Fits:
         BadInput
             What the reader says; or when there are too many already, or another one is being read.
         """
-        name = called(name)
+        name = shown_name(name)
         if len(data) > LARGEST:
             raise BadInput(f"'{name}' has more than {LARGEST >> 20} MB; cut it, or use `upright identify` on it.")
         if not self._reading.acquire(blocking=False):
@@ -70,7 +70,7 @@ class Fits:
             path = folder / f"{key}.log"
             path.write_bytes(data)
             try:
-                text = self._carry(inspect_log, path, name, seconds=READING).run()
+                text = self._carry(begin_inspection, path, name, seconds=READING).run()
             except BaseException:
                 path.unlink()
                 raise
@@ -110,7 +110,7 @@ class Fits:
             key = f"fit-{max(taken, default=0) + 1}"
             rig = self._rig.rig_path if known["own"] or of == OWN else None
             self._job = self._carry(
-                identify_log, path, name, rig, self._folder / "fits" / key, seconds=FITTING, grace=GRACE,
+                begin_identification, path, name, rig, self._folder / "fits" / key, seconds=FITTING, grace=GRACE,
                 progress=self._progress,
             )  # fmt: skip
             self._failed = ""
@@ -175,7 +175,7 @@ class Fits:
                 self._now, self._job, self._failed = None, None, failed[:1].upper() + failed[1:]
 
 
-def called(name: str) -> str:
+def shown_name(name: str) -> str:
     """What a file is called, for sentences only; never a path."""
     last = re.split(r"[/\\]", name)[-1]
     return "".join(c for c in last if c.isprintable())[:100].strip() or "log"

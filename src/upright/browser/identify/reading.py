@@ -12,7 +12,7 @@ from upright.readers.source import load
 from upright.records import Record
 
 
-def read_log(path: Path, name: str) -> Record:
+def record_named(path: Path, name: str) -> Record:
     """Record of a log whose sentences call it by its owner's name."""
     return read_source(replace(load(path), file=name))
 
@@ -25,7 +25,7 @@ def inspect_log(path: Path, name: str, progress: Progress) -> str:
     BadInput
         What its reader says, with the name by which its owner calls it.
     """
-    record = read_log(path, name)
+    record = record_named(path, name)
     inspect(record)
     seconds = float(record.t[-1] - record.t[0])
     return json.dumps({"rows": len(record), "seconds": seconds, "columns": list(record.names)[:40]})

@@ -13,7 +13,7 @@ from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 
 from upright.browser.hub import Hub
-from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Fits
+from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Identifications
 from upright.browser.messages import LONGEST
 from upright.errors import BadInput, UprightError
 
@@ -28,7 +28,7 @@ FILES = {"html": ("report.html", "text/html"), "json": ("facts.json", "applicati
 Answering = Callable[[Request], Awaitable[Response]]
 
 
-def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Fits]) -> list[Route]:
+def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list[Route]:
     """The addresses of some rigs."""
 
     async def described(request: Request) -> Response:
@@ -46,7 +46,7 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Fits]) -> list[Route]:
         name = f"{request.path_params['name']}-{key}.json" if end == "fit" else None
         return FileResponse(path, media_type=FILES[end][1], filename=name)
 
-    def for_operator(answer: Callable[[Request, Fits], Awaitable[Response]]) -> Answering:
+    def for_operator(answer: Callable[[Request, Identifications], Awaitable[Response]]) -> Answering:
         async def checked(request: Request) -> Response:
             name = request.path_params["name"]
             if name not in hubs:
@@ -63,17 +63,17 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Fits]) -> list[Route]:
 
         return checked
 
-    async def bring(request: Request, own: Fits) -> Response:
+    async def bring(request: Request, own: Identifications) -> Response:
         data = await _body(request, LARGEST, f"a log of at most {LARGEST >> 20} MB")
         name = request.query_params.get("name", "")
         return JSONResponse(await asyncio.to_thread(own.keep, name, data))
 
-    async def begin(request: Request, own: Fits) -> Response:
+    async def begin(request: Request, own: Identifications) -> Response:
         log, of = _wanted(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
         await asyncio.to_thread(own.begin, log, of)
         return JSONResponse({})
 
-    async def interrupt(_: Request, own: Fits) -> Response:
+    async def interrupt(_: Request, own: Identifications) -> Response:
         own.interrupt()
         return JSONResponse({})
 
@@ -108,18 +108,25 @@ def _operates(hub: Hub, who: str) -> None:
 
 async def _rest(request: Request) -> None:
     """Take what a client still sends of a refused request: who is sending hears no answer."""
-    came = 0
+    came = _announced(request)
+    if came > LARGEST:
+        return
     with suppress(ClientDisconnect, TimeoutError, RuntimeError):
         async with asyncio.timeout(SLOWEST):
             async for chunk in request.stream():
                 came += len(chunk)
-                if came > LARGEST:
+                if came > 2 * LARGEST:
                     return
 
 
-async def _body(request: Request, most: int, what: str) -> bytes:
+def _announced(request: Request) -> int:
+    """Bytes that are to come; 0 where nobody says."""
     length = request.headers.get("content-length", "0")
-    if not length.isdecimal() or len(length) > 12 or int(length) > most:
+    return int(length) if length.isdecimal() and len(length) < 20 else 1 << 62
+
+
+async def _body(request: Request, most: int, what: str) -> bytes:
+    if _announced(request) > most:
         raise BadInput(f"this takes {what}.")
     data = bytearray()
     try:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 
-def inspect_log(*arguments: Any) -> str:
+def begin_inspection(*arguments: Any) -> str:
     """See `reading.inspect_log`."""
     from upright.browser.identify import reading
 
     return reading.inspect_log(*arguments)
 
 
-def identify_log(*arguments: Any) -> str:
+def begin_identification(*arguments: Any) -> str:
     """See `work.identify_log`."""
     from upright.browser.identify import work
 

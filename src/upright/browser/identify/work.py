@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from upright.browser.identify.bounded import finish
-from upright.browser.identify.reading import read_log
+from upright.browser.identify.reading import record_named
 from upright.errors import BadInput
 from upright.experiments.stand.known import bench_values, model_of
 from upright.files import plain_values, replace_file
@@ -52,7 +52,7 @@ def identify_log(path: Path, name: str, rig: Path | None, folder: Path, progress
         When log and rig do not go together, or nothing is to be estimated.
     """
     progress("reading the log", 0.0)
-    record = read_log(path, name)
+    record = record_named(path, name)
     study = study_of_record(record) if rig is None else _study_of_rig(record, rig)
     study = _tested(study)
     if not study.model.estimated:
