@@ -3,6 +3,7 @@
 import { Bar, isPhone, message } from "./bar";
 import { Design } from "./design";
 import { byId, make } from "./dom";
+import { Guide } from "./guide";
 import { Identify } from "./identify";
 import { Run } from "./run";
 import { Runs } from "./runs";
@@ -59,6 +60,7 @@ async function bench(): Promise<void> {
     track.scene(moving);
     offer("design", moving);
     offer("track", session.scene.tracked !== undefined);
+    guide.scene(moving);
     bar.show();
   };
   const session: Session = new Session(name, {
@@ -77,6 +79,7 @@ async function bench(): Promise<void> {
       }
     },
     message,
+    steered: (request) => guide.steered(request),
   });
   const run = new Run(session), runs = new Runs(session), track = new Track(session);
   const identify = new Identify(session, () => {
@@ -102,6 +105,7 @@ async function bench(): Promise<void> {
     if (there && wanted === screen) show(wanted);
     if (there && wanted === screen) wanted = undefined;
   };
+  const guide = new Guide(session, track, (screen) => { wanted = undefined; show(screen); });
   const tabs = () => SCREENS.filter((s) => !byId(`tab-${s}`).hidden);
   for (const screen of SCREENS) byId(`tab-${screen}`).addEventListener("click", () => { wanted = undefined; show(screen); });
   byId("tab-run").parentElement!.addEventListener("keydown", (event) => {
@@ -126,6 +130,7 @@ async function bench(): Promise<void> {
     if (!byId("run").hidden) run.draw();
     if (!byId("track").hidden) track.draw();
     bar.clock();
+    guide.look();
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);

@@ -35,6 +35,10 @@ export interface Scene {
   linear?: { A: number[][]; B: number[]; delay: number };
   law?: LawNumbers;
   reference?: FollowedWave;
+  /** How far from upright the supervisor lets it go. */
+  lean: number | null;
+  /** Of the model: frequency hanging [rad/s], unstable pole and zero [1/s]; the sets of poles that the paper prints. */
+  facts: { hanging?: number; unstable?: number; zero: number | null; sets: Complex[][] };
   you: string;
 }
 

@@ -22,7 +22,7 @@ export class Session {
 
   constructor(
     readonly name: string,
-    private readonly on: { scene: () => void; state: (before: State | undefined) => void; message: (sentence: string) => void },
+    private readonly on: { scene: () => void; state: (before: State | undefined) => void; message: (sentence: string) => void; steered: (request: ClientRequest) => void },
   ) {
     const url = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live/${encodeURIComponent(name)}`;
     // Who this page was before it was loaded again, or lost its connection, it is again.
@@ -56,7 +56,7 @@ export class Session {
     if (this.unsteerable) return this.on.message(this.unsteerable);
     this.on.message("");
     if (this.state?.operator !== "you" && request.do !== "operate") this.connection.send({ do: "operate" });
-    this.connection.send(request);
+    if (this.connection.send(request)) this.on.steered(request);
   }
 
   private received(received: ServerMessage): void {

@@ -22,7 +22,6 @@ interface TwinData {
   away: number[];
   seconds: number;
   travel: number | null;
-  fallen: number;
   A: number[][];
   B: number[];
   K: number[];
@@ -51,6 +50,7 @@ declare class Twin {
   set(change: Partial<TwinSettings>): void;
   place(poles: Complex[]): void;
   restart(away?: number[]): void;
+  push(coordinate: number, speed: number): void;
   advance(samples: number): Float64Array[];
 }
 

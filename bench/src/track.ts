@@ -106,16 +106,26 @@ export class Track {
     if (!same) this.start = now?.shape === "step" ? now.value : 0;
     const seconds = wave.shape === "step" ? SECONDS : 2 * wave.period, count = Math.round(seconds / dt);
     this.reference = Float64Array.from({ length: count }, (_, k) => valueAt(wave, k, dt));
-    this.rows = this.twin ? this.ofTwin(this.twin, count) : this.ofModel();
+    this.rows = this.predicted(this.reference, this.start);
     this.judge();
-    const fallen = this.twin ? this.rows.findIndex((row) => Math.abs(row.at(-3)!) > DATA.fallen) : -1;
+    const { lean } = scene, fallen = lean ? this.rows.findIndex((row) => Math.abs(row.at(-3)!) > lean) : -1;
     if (fallen >= 0) this.rows.length = fallen; // what the law makes of one that lies says nothing
     this.charts();
     this.table();
     this.gate();
   }
 
-  private ofTwin(twin: Twin, count: number): Float64Array[] {
+  /** What the model makes of a step from rest at 0: how far beyond it, and the wrong way first. */
+  foresee(value: number): { beyond: number; wrong: number } {
+    const rows = this.predicted(new Float64Array(Math.round(SECONDS / this.session.scene!.period)).fill(value), 0), column = 2 * this.session.scene!.tracked!;
+    return overshoot(0, value, (k) => rows[k]![column]!, rows.length);
+  }
+
+  private predicted(reference: Float64Array, start: number): Float64Array[] {
+    return this.twin ? this.ofTwin(this.twin, reference, start) : this.ofModel(reference, start);
+  }
+
+  private ofTwin(twin: Twin, reference: Float64Array, from: number): Float64Array[] {
     const { K, law, tracked } = this.session.scene!, { one } = twin, p = DATA.coordinates.length;
     const put = (name: string, value: number) => {
       const row = one.described.parameters.indexOf(name);
@@ -125,17 +135,17 @@ export class Track {
     twin.set({ holding: true });
     put(`lD0_${p}`, law!.D[0]![p]!);
     law!.B.forEach((row, i) => put(`lB${i}_${p}`, row[p]!));
-    one.arrays.R.fill(this.reference.at(-1)!).set(this.reference);
-    twin.restart(DATA.start.map((_, i) => (i === 2 * tracked! ? this.start : 0)));
+    one.arrays.R.fill(reference.at(-1)!).set(reference);
+    twin.restart(DATA.start.map((_, i) => (i === 2 * tracked! ? from : 0)));
     const { point } = DATA;
-    return twin.advance(count).map((row) => row.map((v, i) => (i % 2 || i === 2 * p ? v : v - point[i / 2]!)));
+    return twin.advance(reference.length).map((row) => row.map((v, i) => (i % 2 || i === 2 * p ? v : v - point[i / 2]!)));
   }
 
   /** Of the linear model; a chain without springs to ground is at rest anywhere, moved as a whole. */
-  private ofModel(): Float64Array[] {
+  private ofModel(reference: Float64Array, from: number): Float64Array[] {
     const { linear, law, period, command, coordinates, point, tracked } = this.session.scene!, whole = !point.some((q) => q !== 0);
-    const start = coordinates.flatMap((_, i) => [whole || i === tracked ? this.start : 0, 0]);
-    return linearAnswer({ ...linear!, law: law!, period, limit: command.limit }, this.reference, start);
+    const start = coordinates.flatMap((_, i) => [whole || i === tracked ? from : 0, 0]);
+    return linearAnswer({ ...linear!, law: law!, period, limit: command.limit }, reference, start);
   }
 
   private answer = (k: number): number => this.rows[k]![2 * this.session.scene!.tracked!]!;
@@ -149,12 +159,12 @@ export class Track {
 
   /** Why the model would not follow, or "". */
   private judge(): void {
-    const { tracked, travel, coordinates, moved } = this.session.scene!, { unit, scale } = shownUnit(coordinates[tracked!]!.unit);
+    const { tracked, travel, lean, coordinates, moved } = this.session.scene!, { unit, scale } = shownUnit(coordinates[tracked!]!.unit);
     const most = (column: number) => this.rows.reduce((m, row) => Math.max(m, Math.abs(row[column]!)), 0);
     const end = travel ?? Infinity, limit = `${clean(end * scale)} ${unit}`;
     this.outcome =
       Math.abs(this.wave.value) > end ? `The reference lies beyond the travel of ${limit} to either side.`
-      : this.twin && most(2 * (coordinates.length - 1)) > DATA.fallen ? `The ${short(coordinates.at(-1)!.meaning)} of the model falls. Take a smaller or a slower reference.`
+      : lean && most(2 * (coordinates.length - 1)) > lean ? `The ${short(coordinates.at(-1)!.meaning)} of the model falls. Take a smaller or a slower reference.`
       : most(2 * moved) > end ? `The ${short(coordinates[moved]!.meaning)} of the model leaves its travel of ${limit}. Take a smaller or a slower reference.`
       : this.full > LONG ? `The model's command is at its limit for ${(100 * this.full).toFixed(0)} % of the time, and at most ${100 * LONG} % are followed. Take a smaller or a slower reference.`
       : "";

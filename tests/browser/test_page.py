@@ -95,6 +95,79 @@ def test_a_whole_session_by_keyboard_alone(server, chromium):
         assert one.wrong == []
 
 
+def guided(one) -> None:
+    """Open the guide, and answer its first question."""
+    one.page.click("#guide-toggle")
+    one.page.fill("#guide-answer input", "5")
+    one.page.click("#guide-predict")
+    one.page.click("#guide-details summary")
+
+
+def test_the_guide_asks_before_it_answers_and_remembers_by_keyboard_alone(server, chromium):
+    with student(chromium, server) as one:
+        page = one.page
+        page.wait_for_selector("#tab-design:not([hidden])")
+        page.wait_for_selector("#guide-toggle:not([hidden])")
+
+        def answers(text):
+            tab_to(page, "#guide-answer input")
+            page.keyboard.type(text)
+            page.keyboard.press("Enter")
+
+        def goes_on():
+            tab_to(page, "#guide-next")
+            page.keyboard.press("Enter")
+
+        tab_to(page, "#guide-toggle")
+        page.keyboard.press("Enter")
+        one.reads("#guide-part", "question 1 of 7")
+        assert not page.locator("#guide-after").is_visible()
+        goes_on()
+        one.reads("#message", "Predict first")
+        tab_to(page, "#guide-predict")
+        page.keyboard.press("Enter")
+        one.reads("#message", "Give a number first")
+        answers("8")
+        one.reads("#guide-compare", r"You said 8\.00 rad/s; the model has 7\.98 rad/s: close")
+        tab_to(page, "#guide-details summary")
+        page.keyboard.press("Enter")
+        one.reads("#guide-source", "erratum 1")
+        page.reload()
+        page.wait_for_selector("#tab-design:not([hidden])")
+        one.reads("#guide-compare", r"You said 8\.00 rad/s")
+        goes_on()
+        answers("4")
+        one.reads("#guide-compare", "too small, 50 % off")
+        goes_on()
+        answers("0.3")
+        one.reads("#guide-measured", "Not measured yet")
+        tab_to(page, "#start")
+        page.keyboard.press("Enter")
+        one.sees("running")
+        one.reads("#guide-measured", r"Measured: [\d.]+ V")
+        model, measured = (
+            float(re.search(r"(?:has|Measured:) ([\d.]+) V", page.inner_text(f"#guide-{part}"))[1])
+            for part in ("compare", "measured")
+        )
+        assert measured == pytest.approx(model, rel=0.25)
+        goes_on()
+        tab_to(page, "#guide-answer input")
+        page.keyboard.press("ArrowDown")
+        tab_to(page, "#guide-predict")
+        page.keyboard.press("Enter")
+        one.reads("#guide-compare", "The model says: set 4")  # R is halved from set to set
+        tab_to(page, "#guide-actions button:nth-child(4)")
+        page.keyboard.press("Enter")
+        one.reads("#message", "act from tick")
+        tab_to(page, "#guide-actions button:nth-child(5)")
+        page.keyboard.press("Enter")
+        one.reads("#guide-measured", r"set 1 –, set 2 –, set 3 –, set 4 \d\.\d+ V")
+        page.keyboard.press("Escape")
+        one.sees("stopped")
+        one.leaves()
+        assert one.wrong == []
+
+
 def test_a_whole_session_by_mouse_until_it_falls(server, chromium):
     with student(chromium, server) as one:
         page = one.page
@@ -313,9 +386,11 @@ def test_axe_finds_nothing_nothing_is_clipped_and_stop_lies_open(server, chromiu
         with student(chromium, server, dark=dark, **kind) as one:
             width = kind["viewport"]["width"]
             one.page.wait_for_selector("#drawing polyline", state="attached")
-            for screen in SCREENS:
+            for screen in (*SCREENS, "run", "track"):  # the last two beside the guide
                 if kind is not PHONE:
                     one.page.click(f"#tab-{screen}")
+                    if screen == SCREENS[-1]:
+                        guided(one)
                 if screen == "design" and kind is not PHONE:
                     one.reads("#share", "rigs are stabilised")
                 present = axe.Axe().run(one.page).response["violations"]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from upright.basis import Basis
+from upright.browser.facts import facts
 from upright.designing.proposal import design_unasked
 from upright.designing.run import DesignRequest
 from upright.errors import BadInput
@@ -27,7 +28,7 @@ from upright.paper.reproduce import TABLE_1
 from upright.records import Array
 from upright.rig import Rig
 from upright.rigs.rigfile import RigFile, read_rig_file
-from upright.running.rig import model_and_truth, read_law
+from upright.running.rig import LEAN, model_and_truth, read_law
 from upright.systems import StateSpace
 
 MEMORY = 0.5
@@ -122,17 +123,33 @@ class BenchRig:
             "poles": [] if self.loop is None else self.poles(self.loop.K),
             "K": [] if self.loop is None else self.loop.K[0].tolist(),
             "follows": self.follows, "basis": self.basis.plain(), **self._loop_to_follow,
+            "lean": self.lean, "facts": facts(self.model, self.at, self.tracked),
         }  # fmt: skip
 
     @property
-    def _loop_to_follow(self) -> dict[str, Any]:
-        """Where the law follows a reference: which coordinate is looked at, and what predicts its answer."""
+    def lean(self) -> float | None:
+        """How far from upright the supervisor lets it go [rad or m]; None where it stands by itself."""
+        unit = self.model.plant.coordinates[-1].unit
+        lean = self.file.lean(unit, LEAN if unit == "rad" else math.inf)
+        return lean if self.at != self.zero and math.isfinite(lean) else None
+
+    @property
+    def tracked(self) -> int | None:
+        """Index of what follows a reference: the body driven below a pendulum, the far body of a shaft."""
+        plant = self.model.plant
+        names = [c.name for c in plant.coordinates]
         if not self.follows or not isinstance(self.law, Law):
+            return None
+        return names.index(plant.inputs[0].on) if "inverted" in plant.equilibria else len(names) - 1
+
+    @property
+    def _loop_to_follow(self) -> dict[str, Any]:
+        """Where the law follows a reference, what predicts its answer."""
+        if self.tracked is None or not isinstance(self.law, Law):
             return {}
-        names, linear = [c.name for c in self.model.plant.coordinates], self.linear
-        pendulum = "inverted" in self.model.plant.equilibria
+        linear = self.linear
         return {
-            "tracked": names.index(self.model.plant.inputs[0].on) if pendulum else len(names) - 1,
+            "tracked": self.tracked,
             "linear": {"A": linear.A.tolist(), "B": linear.B[:, 0].tolist(), "delay": self.model.delay},
             "law": numbers(self.law),
         }
