@@ -11,13 +11,13 @@ from pathlib import Path
 from PIL import Image
 
 from tests.browser.runs import record_first_motions, twin
-from tests.browser.students import PHONE, Server, browser, student
+from tests.browser.students import PHONE, Server, Student, browser, student
 
-NAMES = ("bench_run", "bench_identify", "bench_design", "bench_track", "bench_phone")
+NAMES = ("bench_run", "bench_identify", "bench_design", "bench_track", "bench_guide", "bench_phone")
 
 
 def take(folder: Path, server: Server) -> None:
-    """Run, Track, Design in the dark, and a phone that watches, each of a run that goes on."""
+    """Run, Track, the guide, Design in the dark, and a phone that watches, each of a run that goes on."""
     with browser() as chromium, student(chromium, server) as one:
         one.page.wait_for_selector("#drawing polyline", state="attached")
         one.starts()
@@ -37,6 +37,11 @@ def take(folder: Path, server: Server) -> None:
         one.page.wait_for_timeout(6000)
         one.page.screenshot(path=folder / "bench_track.png")
         one.page.click("#home")
+        one.page.click("#tab-run")
+        guided(one)
+        one.page.mouse.move(0, 300)
+        one.page.screenshot(path=folder / "bench_guide.png")
+        one.page.click("#guide-toggle")
         one.page.emulate_media(color_scheme="dark")
         one.page.click("#tab-design")
         one.reads("#share", "rigs are stabilised")
@@ -60,6 +65,23 @@ def take_fit(folder: Path, server: Server) -> None:
         one.page.wait_for_timeout(500)
         picture = Image.open(BytesIO(one.page.screenshot()))
         picture.quantize(128, dither=Image.Dither.NONE).save(folder / "bench_identify.png", optimize=True)
+
+
+def guided(one: Student) -> None:
+    """Three predictions, and the paper's first and last set of poles after a tap each."""
+    one.page.click("#guide-toggle")
+    for prediction in ("7", "8", "0.3"):
+        one.page.fill("#guide-answer input", prediction)
+        one.page.click("#guide-predict")
+        one.page.click("#guide-next")
+    one.page.locator("#guide-answer input").nth(2).check()
+    one.page.click("#guide-predict")
+    for chosen in ("1", "4"):
+        one.page.click(f"#guide-actions button:nth-child({chosen})")
+        one.page.wait_for_timeout(2500)
+        one.page.click("#guide-actions button:nth-child(5)")
+        one.reads("#guide-measured", rf"set {chosen} \d")
+    one.page.locator("#guide-measured").scroll_into_view_if_needed()
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ def facts(model: Rig, at: str, tracked: int | None) -> dict[str, Any]:
     at : str
         Equilibrium that is held.
     tracked : int or None
-        Coordinate that follows a reference; its zero furthest right [1/s] is told where one lies right of the axis.
+        Coordinate that follows a reference; its zero furthest right [1/s] is given where one lies right of the axis.
     """
     out: dict[str, Any] = {"sets": [], "zero": None}
     if {"hanging", "inverted"} <= set(model.plant.equilibria):
