@@ -4,6 +4,7 @@ The twin of the Furuta pendulum runs by the clock on the wall, 1131 ticks a seco
 a run; its server is this process, its loop another, and all who look on are a third. Taps and poles are timed from
 their sending to the tick that takes them, on one clock; poles are placed in between. Bytes are those of frames and
 notes with their headers, for each sample, at 1 kHz. Late ticks are those of the whole run with so many watchers.
+At last a class of sixty, see `benchmarks.classroom`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from benchmarks.classroom import class_lines
 from benchmarks.measure import Line, Target, spread
 from upright.browser.serve import open_bench
 from upright.realtime.process import run_in_process
@@ -38,7 +40,8 @@ def run(*, quick: bool, progress: Callable[[str], None]) -> list[Line]:
     for watchers in (0, WATCHERS):
         progress(f"{watchers} watchers")
         lines += _lines(watchers, *_served(watchers, seconds))
-    return lines
+    progress("a class")
+    return lines + class_lines(seconds)
 
 
 def _served(watchers: int, seconds: float) -> tuple[dict[str, Any], dict[str, list[float]], Any]:

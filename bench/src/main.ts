@@ -1,6 +1,7 @@
 // The bench: one rig on several screens, and what is there on each of them.
 
 import { Bar, isPhone, message } from "./bar";
+import { type ClassFacts, classroom } from "./classroom";
 import { Design } from "./design";
 import { byId, make } from "./dom";
 import { Guide } from "./guide";
@@ -20,10 +21,15 @@ type Screen = (typeof SCREENS)[number];
 
 const AGAIN = 1000; // ms
 
-async function rigs(): Promise<Listed[]> {
+interface Listing {
+  rigs: Listed[];
+  class?: ClassFacts;
+}
+
+async function rigs(): Promise<Listing> {
   for (;;) {
     const answer = await fetch("/api/rigs").catch(() => undefined);
-    if (answer?.ok) return ((await answer.json()) as { rigs: Listed[] }).rigs;
+    if (answer?.ok) return (await answer.json()) as Listing;
     await new Promise((resolve) => setTimeout(resolve, AGAIN));
   }
 }
@@ -42,7 +48,9 @@ function unknown(rig: string): Promise<string> {
 const place = (): string[] => location.hash.split("/").slice(1).map(decodeURIComponent);
 
 async function bench(): Promise<void> {
-  const all = await rigs(), name = (all.find((rig) => rig.name === place()[0]) ?? all[0])?.name;
+  const { rigs: all, class: ofClass } = await rigs(), known = all.find((rig) => rig.name === place()[0]);
+  if (ofClass && !known) return classroom(all, ofClass);
+  const name = (known ?? all[0])?.name;
   if (!name) return message("This bench has no rig; start it with a RIG.toml.");
   // The rig's kernel is compiled at the first request: what stops the rig does not wait for it.
   let moving = false, design: Design | undefined, built = "", wanted = place()[1];
@@ -115,7 +123,10 @@ async function bench(): Promise<void> {
     show(next);
     byId(`tab-${next}`).focus();
   });
-  if (all.length > 1) {
+  if (ofClass) {
+    byId("rigs").hidden = false;
+    byId("rigs").append(make("a", { href: "#/class" }, ofClass.instructor ? "All students" : "Not you? All names"));
+  } else if (all.length > 1) {
     byId("rigs").hidden = false;
     byId("rigs").append(...all.map((rig) => make("a", { href: `#/${encodeURIComponent(rig.name)}/run`, ...(rig.name === name ? { "aria-current": "page" } : {}) }, rig.title)));
   }

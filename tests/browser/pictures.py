@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tempfile
+import threading
 import time
+from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
 
 from PIL import Image
+from websockets.sync.client import connect
 
 from tests.browser.runs import record_first_motions, twin
-from tests.browser.students import PHONE, Server, Student, browser, student
+from tests.browser.students import DESK, PHONE, Server, Student, browser, student
 
-NAMES = ("bench_run", "bench_identify", "bench_design", "bench_track", "bench_guide", "bench_phone")
+NAMES = ("bench_run", "bench_identify", "bench_design", "bench_track", "bench_guide", "bench_phone", "bench_class")
+FIRST = [
+    "Ada", "Ben", "Chen", "Dilek", "Émile", "Fatma", "Goran", "Hana", "Ivo", "Jana", "Kofi", "Lena", "Mats", "Nadia",
+    "Omar", "Pia", "Quentin", "Rosa", "Søren", "Tomás", "Uta", "Vera", "Wei", "Xenia", "Yusuf", "Zoë", "Anouk", "Björn",
+    "Clara", "Deniz",
+]  # fmt: skip
+"""Of the class of sixty; each with one of two letters."""
 
 
 def take(folder: Path, server: Server) -> None:
@@ -84,10 +94,40 @@ def guided(one: Student) -> None:
     one.page.locator("#guide-measured").scroll_into_view_if_needed()
 
 
+def take_class(folder: Path, server: Server) -> None:
+    """Sixty students at work: some have fallen, one has stopped, a few are not there yet."""
+    with browser() as chromium, ExitStack() as everybody:
+        names = [rig["name"] for rig in server.rigs_of()]
+        sockets = [everybody.enter_context(connect(f"{server.url.replace('http', 'ws', 1)}live/{n}")) for n in names]
+        for socket in sockets:  # whose frames nobody reads
+            threading.Thread(target=lambda mine=socket: [None for _ in mine], daemon=True).start()
+        for k, socket in enumerate(sockets[:-6]):
+            for do in ("operate", "start") if k % 17 else ("operate",):
+                socket.send(json.dumps({"do": do}))
+        context = chromium.new_context(**DESK)
+        page = context.new_page()
+        page.goto(server.instructor_url)
+        page.get_by_text("50 upright").wait_for()
+        page.wait_for_timeout(8000)
+        for k in (3, 20, 41):
+            sockets[k].send(json.dumps({"do": "tap", "coordinate": "theta", "speed": 12.0}))
+        sockets[11].send(json.dumps({"do": "stop"}))
+        for k in range(5, 50, 7):
+            sockets[k].send(json.dumps({"do": "tap", "coordinate": "theta", "speed": 1.5}))
+        page.wait_for_timeout(700)
+        page.screenshot(path=folder / "bench_class.png")
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as runs:
         record_first_motions(twin(Path(runs)), Path(runs) / "furuta", started=time.time())
         opened = Server(Path(runs), fifo=True)
         take(Path(sys.argv[1]), opened)
         take_fit(Path(sys.argv[1]), opened)
+        opened.close()
+    with tempfile.TemporaryDirectory() as runs:
+        listed = Path(runs) / "roster.csv"
+        listed.write_text("name\n" + "\n".join(f"{n} {c}." for c in "AB" for n in FIRST), encoding="utf-8")
+        opened = Server(Path(runs), fifo=True, roster=listed)
+        take_class(Path(sys.argv[1]), opened)
         opened.close()

@@ -25,32 +25,38 @@ PATIENCE = 240_000  # ms, on a machine that may do much else; a swing-up is desi
 
 
 class Server:
-    """`upright bench` as its user starts it, with rigs or with its twin of the Furuta pendulum."""
+    """`upright bench` as its user starts it, with rigs or with its twin of the Furuta pendulum, or for a class."""
 
-    def __init__(self, folder: Path, *rigs: Path, fifo: bool = False) -> None:
+    def __init__(self, folder: Path, *rigs: Path, fifo: bool = False, roster: Path | None = None) -> None:
         if not files("upright.browser").joinpath("page/index.html").is_file():
             pytest.skip("the page is not built: npm --prefix bench install && npm --prefix bench run build")
-        self.folder, self.rigs, self.port, self.fifo = folder, rigs, 0, fifo
+        self.folder, self.rigs, self.port, self.fifo, self.roster = folder, rigs, 0, fifo, roster
         self.open()
 
     def open(self) -> None:
         """Start it, at the port that it had before."""
         command = [sys.executable, "-m", "upright", "bench", *map(str, self.rigs), "--no-browser"]
         command += ["-o", str(self.folder), *([] if self.fifo else ["--no-fifo"])]
+        command += [] if self.roster is None else ["--class", str(self.roster)]
         self.process = subprocess.Popen([*command, "--port", str(self.port)], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         for line in self.process.stdout:
             if address := re.search(r"http://127\.0\.0\.1:(\d+)/", line):
                 self.url, self.port = address[0], int(address[1])
+                self.instructor_url = line.split()[-1]  # of a class
                 self._compile()
                 return
         raise AssertionError("the bench printed no address")
 
     def _compile(self) -> None:
         """Ask for every rig's kernel before anybody comes: a browser without a graphics card leaves it no processor."""
-        for rig in json.load(urlopen(f"{self.url}api/rigs"))["rigs"]:
+        for rig in self.rigs_of():
             with suppress(HTTPError):  # a rig may have none
                 urlopen(f"{self.url}rigs/{rig['name']}/twin.js").read()
+
+    def rigs_of(self) -> list[dict[str, Any]]:
+        """What it says of its rigs."""
+        return json.load(urlopen(f"{self.url}api/rigs"))["rigs"]
 
     def kill(self) -> None:
         """End it as a crash does."""
@@ -140,13 +146,13 @@ def browser() -> Iterator[Any]:
 @contextmanager
 def student(
     opened: Any, server: Server, *, screen: str = "run", dark: bool = False,
-    prepare: Callable[[Any], Any] = lambda _: None, **kind: Any,
+    prepare: Callable[[Any], Any] = lambda _: None, rig: str = "furuta", **kind: Any,
 ) -> Iterator[Student]:  # fmt: skip
     """Somebody who opens the page, once it is prepared."""
     context = opened.new_context(color_scheme="dark" if dark else "light", **(kind or DESK))
     someone = Student(context.new_page())
     prepare(someone.page)
-    someone.page.goto(f"{server.url}#/furuta/{screen}")
+    someone.page.goto(f"{server.url}#/{rig}/{screen}")
     try:
         someone.page.wait_for_selector("#state:not([data-state=lost])")
         yield someone

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from upright.browser.guard import COOKIE, HEADERS, Guard
+from upright.browser.guard import COOKIE, HEADERS, OF_CLASS, Guard
 
 HOST = "127.0.0.1:8431"
 
@@ -20,7 +20,7 @@ async def behind(scope, receive, send):
         await send({"type": "http.response.body", "body": b"the page"})
 
 
-def asked(path="/", headers=(), *, token="", kind="http"):
+def asked(path="/", headers=(), *, token="", kind="http", instructor=""):
     """What is sent to a client: status and headers, or what opens or closes a socket; then the text."""
     sent = []
 
@@ -30,7 +30,7 @@ def asked(path="/", headers=(), *, token="", kind="http"):
     path, _, query = path.partition("?")
     fields = [(n.encode(), v.encode()) for n, v in {"host": HOST, **dict(headers)}.items()]
     scope = {"type": kind, "path": path, "query_string": query.encode(), "headers": fields}
-    asyncio.run(Guard(behind, hosts=frozenset({HOST}), token=token)(scope, None, send))
+    asyncio.run(Guard(behind, hosts=frozenset({HOST}), token=token, instructor=instructor)(scope, None, send))
     if kind == "websocket":
         return sent[0]["type"], sent[0].get("code")
     return sent[0]["status"], {n.decode(): v.decode() for n, v in sent[0]["headers"]}, sent[1]["body"].decode()
@@ -83,3 +83,25 @@ def test_with_the_token_everything_answers_from_here_and_no_script_sees_it():
     assert asked("/live/a", own, token="secret", kind="websocket") == ("websocket.accept", None)
     assert asked("/live/a?token=secret", token="secret", kind="websocket")[0] == "websocket.close"
     assert asked("/", {**own, "origin": "http://evil.example"}, token="secret")[0] == 403
+
+
+@pytest.mark.parametrize("token", ["", "lan"])
+def test_the_page_of_a_class_answers_its_instructor_alone(token):
+    student = {"cookie": f"{COOKIE}={token}"}
+    for who in (
+        student,
+        {"cookie": f"{COOKIE}={token}; {OF_CLASS}=wrong"},
+        {"cookie": f"{COOKIE}={token}; {OF_CLASS}="},
+    ):
+        assert asked("/class", who, token=token, kind="websocket", instructor="right") == ("websocket.close", 4403)
+    assert asked("/", student, token=token, instructor="right")[0] == 200
+    teacher = {"cookie": f"{COOKIE}={token}; {OF_CLASS}=right"}
+    assert asked("/class", teacher, token=token, kind="websocket", instructor="right") == ("websocket.accept", None)
+    assert asked("/class", teacher, token=token, kind="websocket")[0] == "websocket.close"  # of no class
+
+
+def test_the_instructors_address_is_turned_into_cookies_once():
+    status, had, _ = asked("/?instructor=right", token="lan", instructor="right")
+    assert (status, had["location"]) == (303, "/#/class")
+    assert asked("/?instructor=wrong", token="lan", instructor="right")[0] == 403
+    assert asked("/?instructor=", instructor="")[2] == "the page"

@@ -23,7 +23,7 @@ from upright.logs import read_log
 from upright.realtime.desk import Desk
 from upright.realtime.pace import Virtual, WallClock
 from upright.realtime.priority import LoopPriority
-from upright.realtime.process import _child, _deaf, _Window, run_in_process
+from upright.realtime.process import _child, _Window, deaf_parent, run_in_process
 from upright.realtime.session import RunEnd, RunOrder, RunState, carry_out
 from upright.rigs import Board, Fault, Mode, TwinPort
 from upright.rigs.supervisor import Supervisor
@@ -287,7 +287,7 @@ def test_the_kernel_has_been_told_to_end_the_loop_with_its_parent():
 def test_a_parent_is_missed_when_it_has_not_looked_for_two_seconds():
     """As docs/howto/rigs.md says; in eighths of a second, which are exact."""
     looks, now = SimpleNamespace(value=0), [100.0]
-    deaf = _deaf(looks, lambda: now[0])
+    deaf = deaf_parent(looks, lambda: now[0])
     for _ in range(5):
         looks.value += 1
         assert not deaf()

@@ -18,6 +18,9 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
+from upright.browser.classroom.overview import Overview
+from upright.browser.classroom.room import Classroom
+from upright.browser.guard import INSTRUCTOR
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import Identifications
 from upright.browser.identify.routes import routes as identify_routes
@@ -30,6 +33,8 @@ from upright.errors import BadInput, UprightError
 
 RATE = 40.0
 """Frames a second."""
+RATE_OF_CLASS = 20.0
+"""The same of each student's rig: sixty of them are encoded and sent by one processor."""
 PATIENCE = 10
 """Messages in a row that are not understood, or ten times as many that come too fast, before a connection is closed."""
 SWIFTEST = 50.0
@@ -56,11 +61,13 @@ def is_built() -> bool:
     return files("upright.browser").joinpath("page/index.html").is_file()
 
 
-def application(stations: Sequence[Station]) -> Starlette:
-    """The bench of some rigs."""
+def application(stations: Sequence[Station], room: Classroom | None = None) -> Starlette:
+    """The bench of some rigs, which may be those of a class."""
     hubs = {station.rig.name: Hub(station) for station in stations}
     fits = {name: Identifications(hub.station.rig, hub.station.folder) for name, hub in hubs.items()}
-    scripts: dict[str, asyncio.Task[str]] = {}
+    grid = None if room is None else Overview(room)
+    rate = RATE if grid is None else RATE_OF_CLASS
+    scripts: dict[Path, asyncio.Task[str]] = {}
 
     async def page(_: Request) -> Response:
         content = _content("upright.browser", "page/index.html")
@@ -71,25 +78,30 @@ def application(stations: Sequence[Station]) -> Starlette:
         content = _content(package, name) if package else None
         return _nothing() if content is None else Response(content, media_type=kind)
 
-    async def rigs(_: Request) -> Response:
+    async def rigs(request: Request) -> Response:
         known = [
             {"name": n, "title": h.station.rig.model.name, "kind": h.station.rig.kind, "state": h.station.state,
              "operated": bool(h.station.lease.holder)}
             for n, h in hubs.items()
         ]  # fmt: skip
-        return JSONResponse({"version": __version__, "rigs": known})
+        of_class: dict[str, Any] = {}
+        if grid is not None:
+            unit = grid.room.rig.model.plant.coordinates[-1].unit
+            of_class = {"class": {"instructor": bool(request.scope.get(INSTRUCTOR)), "unit": unit}}
+        return JSONResponse({"version": __version__, "rigs": known, **of_class})
 
     async def script(request: Request) -> Response:
         name = request.path_params["name"]
         if name not in hubs:
             return _nothing()
-        if name not in scripts:
-            scripts[name] = asyncio.create_task(asyncio.to_thread(in_own_process, twin_script, hubs[name].station.rig))
+        rig = hubs[name].station.rig  # a class knows one rig, by one law
+        if rig.law_path not in scripts:
+            scripts[rig.law_path] = asyncio.create_task(asyncio.to_thread(in_own_process, twin_script, rig))
         try:
-            return Response(await asyncio.shield(scripts[name]), media_type=SCRIPT)
+            return Response(await asyncio.shield(scripts[rig.law_path]), media_type=SCRIPT)
         except UprightError as error:
             if not isinstance(error, BadInput):  # its process was killed, say: the next one may fare better
-                scripts.pop(name, None)
+                scripts.pop(rig.law_path, None)
             return PlainTextResponse(str(error), status_code=404)
         finally:  # somebody has opened the rig; one after the other, since processors are few
             hubs[name].station.prepare()
@@ -115,12 +127,25 @@ def application(stations: Sequence[Station]) -> Starlette:
         finally:
             hub.leave(outbox)
 
+    async def whole(socket: WebSocket) -> None:
+        outbox = None if grid is None else grid.join()
+        if grid is None or outbox is None:
+            await socket.close(4404, "no class" if grid is None else "too many look on")
+            return
+        try:
+            await socket.accept()
+            await _first(_listen_to_instructor(socket, grid, outbox), _speak(socket, outbox))
+        finally:
+            grid.leave(outbox)
+
     async def pump() -> None:
         due = time.monotonic()
         while True:
             for hub in hubs.values():
                 hub.turn()
-            due = max(due + 1 / RATE, time.monotonic())
+            if grid is not None:
+                grid.turn()
+            due = max(due + 1 / rate, time.monotonic())
             await asyncio.sleep(due - time.monotonic())
 
     @asynccontextmanager
@@ -140,6 +165,7 @@ def application(stations: Sequence[Station]) -> Starlette:
             Route("/api/rigs/{name}/runs", runs), Route("/rigs/{name}/twin.js", script),
             Route("/rigs/{name}/runs/{file}", result), WebSocketRoute("/live/{name}", live),
             *identify_routes(hubs, fits),
+            WebSocketRoute("/class", whole),
         ],
     )  # fmt: skip
 
@@ -175,6 +201,23 @@ async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None
                 wrong += 1.0
                 if not outbox.note(_error(error)):
                     return
+        await socket.close(4400, "ten messages in a row were not understood")
+
+
+async def _listen_to_instructor(socket: WebSocket, grid: Overview, outbox: Outbox) -> None:
+    """The same for a whole class."""
+    wrong = 0
+    with suppress(WebSocketDisconnect):
+        while wrong < PATIENCE:
+            received = await socket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            try:
+                grid.obey(received.get("text") or "")
+                wrong = 0
+            except UprightError as error:
+                wrong += 1
+                outbox.note(_error(error))
         await socket.close(4400, "ten messages in a row were not understood")
 
 

@@ -12,7 +12,9 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
 
-COOKIE = "upright-bench"
+COOKIE, OF_CLASS = "upright-bench", "upright-class"
+INSTRUCTOR = "upright.instructor"
+"""Of a request's scope: whether it comes from the instructor of a class."""
 POLICY = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; worker-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
@@ -43,10 +45,13 @@ class Guard:
         Values of Host that are this machine.
     token : str
         Needed of everybody, once as ``?token=...`` and then as a cookie; nothing is where it is empty.
+    instructor : str
+        Token of the instructor of a class, once as ``?instructor=...`` and then as a cookie; it stands for the other
+        one too. Paths below ``/class`` answer nobody else.
     """
 
-    def __init__(self, app: App, *, hosts: frozenset[str], token: str = "") -> None:
-        self._app, self._hosts, self._token = app, hosts, token
+    def __init__(self, app: App, *, hosts: frozenset[str], token: str = "", instructor: str = "") -> None:
+        self._app, self._hosts, self._token, self._instructor = app, hosts, token, instructor
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on what may pass."""
@@ -56,13 +61,19 @@ class Guard:
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         if not self._from_here(headers):
             await _refuse(scope, send, 403, "This bench answers its own page only; open the address that it printed.")
+        elif scope["type"] == "http" and _right(_query(scope, "instructor"), self._instructor):
+            await _welcome(send, {OF_CLASS: self._instructor, COOKIE: self._token}, "/#/class")
         elif not self._known(headers):
-            if scope["type"] == "http" and self._right(_query_token(scope)):
-                await _welcome(scope, send, self._token)
+            if scope["type"] == "http" and _right(_query(scope, "token"), self._token):
+                await _welcome(send, {COOKIE: self._token}, "/")
             else:
                 await _refuse(scope, send, 403, "This bench needs the address with the token that it printed.")
         else:
-            await self._app(scope, receive, _with_headers(send))
+            scope[INSTRUCTOR] = _right(_cookie(headers, OF_CLASS), self._instructor)
+            if scope["path"].startswith("/class") and not scope[INSTRUCTOR]:
+                await _refuse(scope, send, 403, "This is for the instructor, who has the address that was printed.")
+            else:
+                await self._app(scope, receive, _with_headers(send))
 
     def _from_here(self, headers: dict[str, str]) -> bool:
         origin = headers.get("origin")
@@ -73,37 +84,42 @@ class Guard:
         )
 
     def _known(self, headers: dict[str, str]) -> bool:
-        if not self._token:
-            return True
-        try:
-            cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-        except CookieError:
-            return False
-        return cookie is not None and self._right(cookie.value)
-
-    def _right(self, token: str) -> bool:
-        return hmac.compare_digest(token.encode(), self._token.encode())
+        return not self._token or _right(_cookie(headers, COOKIE), self._token)
 
 
-def _query_token(scope: Scope) -> str:
-    return parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+def _right(given: str, token: str) -> bool:
+    return bool(token) and hmac.compare_digest(given.encode(), token.encode())
 
 
-async def _welcome(scope: Scope, send: Send, token: str) -> None:
-    """Keep the token where no script sees it, and lead on to the page without it."""
-    cookie = f"{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict"
-    await _answer(send, 303, "", {"location": "/", "set-cookie": cookie})
+def _cookie(headers: dict[str, str], name: str) -> str:
+    try:
+        cookie = SimpleCookie(headers.get("cookie", "")).get(name)
+    except CookieError:
+        return ""
+    return "" if cookie is None else cookie.value
+
+
+def _query(scope: Scope, name: str) -> str:
+    return parse_qs(scope["query_string"].decode("latin-1")).get(name, [""])[0]
+
+
+async def _welcome(send: Send, tokens: dict[str, str], page: str) -> None:
+    """Keep the tokens where no script sees them, and lead on to the page without them."""
+    cookies = [
+        ("set-cookie", f"{name}={token}; Path=/; HttpOnly; SameSite=Strict") for name, token in tokens.items() if token
+    ]
+    await _answer(send, 303, "", [("location", page), *cookies])
 
 
 async def _refuse(scope: Scope, send: Send, status: int, sentence: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 4403, "reason": sentence})
     else:
-        await _answer(send, status, sentence, {"content-type": "text/plain; charset=utf-8"})
+        await _answer(send, status, sentence, [("content-type", "text/plain; charset=utf-8")])
 
 
-async def _answer(send: Send, status: int, text: str, headers: dict[str, str]) -> None:
-    fields = [(n.encode(), v.encode()) for n, v in {**HEADERS, **headers}.items()]
+async def _answer(send: Send, status: int, text: str, headers: list[tuple[str, str]]) -> None:
+    fields = [(n.encode(), v.encode()) for n, v in [*HEADERS.items(), *headers]]
     await send({"type": "http.response.start", "status": status, "headers": fields})
     await send({"type": "http.response.body", "body": text.encode()})
 

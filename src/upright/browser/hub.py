@@ -76,7 +76,7 @@ class Hub:
         if desk is not self._desk:
             self._desk, self._next, self._late, self._answered, self._followed = desk, 0, 0, 0, 0
             self._scenes()
-        if desk is None:
+        if desk is None or not self.clients:
             return
         now = time.monotonic()
         if 2 * sum(outbox.behind for outbox in self.clients) > len(self.clients) and now - self._sent < BEHIND:

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from upright.browser.app import application
+from upright.browser.classroom.room import Classroom
+from upright.browser.classroom.roster import read_roster
 from upright.browser.guard import Guard
 from upright.browser.messages import LONGEST
 from upright.browser.rig import BenchRig, known_rig
@@ -28,26 +30,41 @@ class Bench:
     ----------
     url : str
         Its address; on a network with the token that everybody needs.
+    instructor_url : str
+        The instructor's own, of a class; the others have `url`.
     rigs : tuple of str
         Names of its rigs.
+    lan : bool
+        Whether it answers other machines.
+    room : Classroom or None
+        The class, where there is one.
     folder : Path
         Has the logs and reports of runs, a folder for each rig.
     """
 
     def __init__(
-        self, rigs: Sequence[BenchRig], folder: Path, *, port: int = 0, lan: bool = False, **of_runs: Any
-    ) -> None:
+        self, rigs: Sequence[BenchRig], folder: Path, *, port: int = 0, lan: bool = False,
+        room: Classroom | None = None, **of_runs: Any,
+    ) -> None:  # fmt: skip
         import uvicorn
 
-        self.folder, self.rigs = folder, tuple(rig.name for rig in rigs)
-        self.stations = [Station(rig, folder / rig.name, **of_runs) for rig in rigs]
+        self.folder, self.lan, self.room = folder, lan, room
+        self.stations = [
+            *(() if room is None else room.stations), *(Station(rig, folder / rig.name, **of_runs) for rig in rigs)
+        ]  # fmt: skip
+        self.rigs = tuple(station.rig.name for station in self.stations)
         self._socket = _bound(port, lan)
         port = self._socket.getsockname()[1]
         token = secrets.token_urlsafe(24) if lan else ""
         address = _own_address() if lan else "127.0.0.1"
+        instructor = secrets.token_urlsafe(24) if room is not None else ""
         self.url = f"http://{address}:{port}/" + (f"?token={token}" if token else "")
+        self.instructor_url = f"http://{address}:{port}/?instructor={instructor}" if instructor else ""
         names = {"127.0.0.1", "localhost", *((address, socket.gethostname().lower()) if lan else ())}
-        app: Any = Guard(application(self.stations), hosts=frozenset(f"{n}:{port}" for n in names), token=token)
+        app: Any = Guard(
+            application(self.stations, room), hosts=frozenset(f"{n}:{port}" for n in names), token=token,
+            instructor=instructor,
+        )  # fmt: skip
         self._server = uvicorn.Server(
             uvicorn.Config(
                 app, loop="asyncio", http="h11", ws="websockets-sansio", ws_max_size=LONGEST, ws_max_queue=8,
@@ -67,6 +84,8 @@ class Bench:
             atexit.unregister(self.close)
             for station in self.stations:
                 station.stop("The bench was closed.")
+            if self.room is not None:
+                self.room.close()
             for station in self.stations:
                 station.close()
             self._server.should_exit = True
@@ -96,14 +115,17 @@ class Bench:
 
 
 def open_bench(
-    rigs: Sequence[Path], laws: Sequence[Path], folder: Path, *, port: int = 0, lan: bool = False, **of_runs: Any
-) -> Bench:
+    rigs: Sequence[Path], laws: Sequence[Path], folder: Path, *, port: int = 0, lan: bool = False,
+    roster: Path | None = None, **of_runs: Any,
+) -> Bench:  # fmt: skip
     """A bench of the rigs of some RIG.toml, each with its law; of a twin where there are none.
 
     Parameters
     ----------
+    roster : Path, optional
+        Students, each of whom has a twin of the rig to themselves.
     **of_runs
-        Options of each `Station`.
+        Options of each `Station`, or of a `Classroom`.
 
     Raises
     ------
@@ -122,7 +144,16 @@ def open_bench(
     names = [rig.name for rig in known]
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise BadInput(f"two rigs are called '{twice[0]}'; give each a name in its RIG.toml.")
-    return Bench(known, folder, port=port, lan=lan, **of_runs)
+    if roster is None:
+        return Bench(known, folder, port=port, lan=lan, **of_runs)
+    if len(known) != 1:
+        raise BadInput(f"a class has twins of one rig, got {len(known)}; name the one.")
+    room = Classroom(known[0], read_roster(roster), folder, **of_runs)
+    try:
+        return Bench([], folder, port=port, lan=lan, room=room)
+    except BaseException:
+        room.close()
+        raise
 
 
 def _bound(port: int, lan: bool) -> socket.socket:

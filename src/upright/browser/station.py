@@ -9,9 +9,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upright.basis import NOT_TRUSTED
 from upright.browser.hanging import first_motions, swing_up_apart
@@ -20,6 +21,7 @@ from upright.browser.messages import HANGING, HELD, MOTIONS, ClientRequest
 from upright.browser.rig import HARDWARE, TWIN, BenchRig
 from upright.browser.runs import report_apart
 from upright.errors import BadInput, UprightError, nearest
+from upright.laws import Law
 from upright.live.twin import Loop
 from upright.realtime.desk import Desk
 from upright.realtime.process import BY_HAND, DEAF, run_in_process
@@ -42,6 +44,22 @@ FASTEST = 20.0
 """Tap that a twin's hand gives at most [rad/s or m/s]."""
 
 
+class RunDesk(Protocol):
+    """What a station needs of `Desk`."""
+
+    def stop(self) -> None: ...  # noqa: D102
+    def tap(self, coordinate: int, speed: float) -> None: ...  # noqa: D102
+    def follow(self, reference: Reference) -> None: ...  # noqa: D102
+    def change(self, law: Law) -> bool: ...  # noqa: D102
+    def since(self, number: int) -> tuple[int, NDArray[np.void]]: ...  # noqa: D102
+    @property
+    def answered(self) -> tuple[int, int, str]: ...  # noqa: D102
+    @property
+    def followed(self) -> tuple[int, Reference, int, tuple[float, ...]] | None: ...  # noqa: D102
+    @property
+    def taken(self) -> int: ...  # noqa: D102
+
+
 class Station:
     """A rig, its runs and its operator.
 
@@ -51,6 +69,8 @@ class Station:
         Run an order as `run_in_process` does; write what it came to, and give the verdict; store a swing-up.
     clock : callable
         Time that never goes back [s].
+    desk : callable
+        Gives the desk of a run that is requested.
 
     Attributes
     ----------
@@ -68,11 +88,11 @@ class Station:
         Where the run, or the last one, began: `HELD`, `HANGING` for a swing-up, `MOTIONS` to be identified.
     loop, requested : Loop or None
         The law that runs as state feedback, and the one that was asked for last; a swing-up is none.
-    desk : Desk or None
+    desk : RunDesk or None
         Of the run that goes on, or of the last one.
     """
 
-    desk: Desk | None
+    desk: RunDesk | None
     loop: Loop | None
     requested: Loop | None
     _thread: threading.Thread | None
@@ -81,6 +101,7 @@ class Station:
         self, rig: BenchRig, folder: Path, *, fifo: bool = True, carry: Callable[..., RunEnd] = run_in_process,
         report: Callable[[PreparedRun, RunEnd, float], str] = report_apart,
         swing_up: Callable[[BenchRig, Path], str] = swing_up_apart, clock: Callable[[], float] = time.monotonic,
+        desk: Callable[[RunRequest], RunDesk] = lambda _: Desk(),
     ) -> None:  # fmt: skip
         self.rig, self.folder, self.lease = rig, folder, Lease(clock)
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
@@ -92,6 +113,7 @@ class Station:
         self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
+        self._new_desk = desk
 
     def beat(self) -> None:
         """Say that somebody can stop it; a run whose server does not answer any more ends by itself."""
@@ -140,7 +162,7 @@ class Station:
                 tilt=0.0 if swings else self._tilt(start), from_rest=swings, accept=accept,
                 steered=self.rig.follows and not swings,
             )  # fmt: skip
-        desk = Desk()
+        desk = self._new_desk(request)
         with self._lock:
             self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
             self.origin = origin  # before the desk, by which a new scene is made
@@ -256,7 +278,7 @@ class Station:
         if self.lease.holder != who:
             raise BadInput("somebody else operates it." if self.lease.holder else "take it first.")
 
-    def _running(self) -> Desk:
+    def _running(self) -> RunDesk:
         if self.state != RUNNING or self.desk is None:
             raise BadInput(f"{self.rig.name} does not run.")
         return self.desk
@@ -274,7 +296,7 @@ class Station:
             raise BadInput(f"a run starts within {math.degrees(NEAR):.3g} degrees of what is held.")
         return start[-2]
 
-    def _run(self, request: RunRequest, desk: Desk) -> None:
+    def _run(self, request: RunRequest, desk: RunDesk) -> None:
         started = time.time()
         try:
             run = prepared(request, self.folder)

@@ -163,7 +163,7 @@ def _child(
     for each in ENDING:  # to be ended is to be zeroed first; Ctrl-C is the parent's affair
         signal.signal(each, signal.SIG_IGN if each == signal.SIGINT else _interrupt_once)
     end_with_parent()
-    window, orphan, deaf = _Window(memory, phase), _orphaned(parent), _deaf(looks)
+    window, orphan, deaf = _Window(memory, phase), dead_parent(parent), deaf_parent(looks)
     if orphan():
         return  # before anything is opened
 
@@ -222,7 +222,7 @@ def end_with_parent() -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, ctypes.c_ulong(signal.SIGTERM))
 
 
-def _deaf(looks: Any, clock: Callable[[], float] = time.monotonic) -> Callable[[], bool]:
+def deaf_parent(looks: Any, clock: Callable[[], float] = time.monotonic) -> Callable[[], bool]:
     """Whether the parent has stopped looking; evaluated at every tick."""
     last, since = -1, 0.0
 
@@ -235,7 +235,7 @@ def _deaf(looks: Any, clock: Callable[[], float] = time.monotonic) -> Callable[[
     return deaf
 
 
-def _orphaned(parent: int) -> Callable[[], bool]:
+def dead_parent(parent: int) -> Callable[[], bool]:
     """Whether the process of that id, which started this one, is gone; evaluated at every tick."""
     if sys.platform != "win32":
         return lambda: os.getppid() != parent

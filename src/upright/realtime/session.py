@@ -218,7 +218,11 @@ def carry_out(
         end["target"] = beside.target
         # in virtual time the loop may be ahead of the log by all of the run
         waiting = min(round(order.seconds / about.period) + 100, 1 << 20) if about.virtual and not order.wall else 0
-        hear.log = LogWriter(order.log, header=_header(order, stage, fitted), rows=max(8192, waiting))
+        hear.log = LogWriter(
+            order.log,
+            header=log_header(order, beside.about, stage.units, fitted, clock.time()),
+            rows=max(8192, waiting),
+        )
         for event in hear.events:
             hear.log.event(*event)
         ticking, warning = pace(about)
@@ -335,14 +339,16 @@ def _bring(
         show(RunState(phase=stage.advice or "waiting", time=now.time, tick=now.tick, mode=now.mode))
 
 
-def _header(order: RunOrder, stage: Stage, law: Law | Rule) -> LogHeader:
-    about = stage.supervisor.about
+def log_header(
+    order: RunOrder, about: Capabilities, units: Sequence[str], law: Law | Rule, start: float
+) -> LogHeader:  # fmt: skip
+    """What the log of a run says before its first row; `start` is the time of that since 1970 [s]."""
     return LogHeader(
-        rig=order.rig_text, law=as_values(law), coordinates=tuple(zip(about.coordinates, stage.units, strict=True)),
+        rig=order.rig_text, law=as_values(law), coordinates=tuple(zip(about.coordinates, units, strict=True)),
         command_unit=about.command_unit, period=about.period, references=order.references,
         modes={int(m): m.name for m in Mode} | {BRAKING: "BRAKING"},
         faults={int(f): text for f, text in SENTENCES.items()},
-        driven=(int(Mode.HOST),), start=clock.time(),
+        driven=(int(Mode.HOST),), start=start,
     )  # fmt: skip
 
 

@@ -295,6 +295,22 @@ class Simulator:
             take_turns(step, call.blocks, threads)
         return motion[..., : call.lanes]
 
+    def going_on(self, call: Call, width: int) -> Callable[[int, int, int, Array], None]:
+        """Steps a block of lanes of a call from one sample to another, in a working array of `Call.room` numbers.
+
+        From sample 0 it begins there; from any other it goes on from the array as it was left, see `rows`. Rows of
+        `Call.out` are counted from the first of the two samples.
+        """
+        with compiling(self.loop):
+            compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
+            events = self._kernel.events if self.flavour.dry else 0
+        before, after = call.arguments[:8], call.arguments[11:]
+
+        def go(block: int, first: int, end: int, working: Array) -> None:
+            compiled(block, block + 1, *before, first, end, 1 << 62, *after, working, events)
+
+        return go
+
     def library(self) -> list[str]:
         """Functions of the C library that the kernel calls, whose last bits are each system's own."""
         with compiling(self.loop):
@@ -392,8 +408,8 @@ class Simulator:
                 lanes, P, X0, u, self._reference, begin, self._grid, base, 0, steps + 1, steps, int(every),
                 int(self.substeps), float(self.dt), scalars, buffer, out, reduced,
             ),
-            params=P, x0=X0, start=begin, base=base, lanes=lanes, blocks=blocks, out=out, reduced=reduced,
-            room=room(self._layout, width, buffer),
+            params=P, x0=X0, references=self._reference, start=begin, base=base, lanes=lanes, blocks=blocks, out=out,
+            reduced=reduced, room=room(self._layout, width, buffer),
         )  # fmt: skip
 
 
@@ -405,8 +421,9 @@ class Call:
     ----------
     arguments : tuple of int, float or array
         Those of `lanes.RUN_ARGUMENTS` from ``_total`` to ``STAT``.
-    params, x0, start, base : array
-        Those of the arguments that say what is moved, from where, when, and where locked coordinates stay.
+    params, x0, references, start, base : array
+        Those of the arguments that say what is moved, from where, what it follows, when, and where locked coordinates
+        stay.
     lanes, blocks : int
         Lanes, and blocks of them.
     out, reduced : array
@@ -418,6 +435,7 @@ class Call:
     arguments: tuple[int | float | Array | NDArray[np.int64], ...]
     params: Array
     x0: Array
+    references: Array
     start: NDArray[np.int64]
     base: Array
     lanes: int

@@ -26,8 +26,17 @@ def _until_closed(bench: Bench) -> Iterator[str]:
     from upright.realtime.interrupts import ENDING, ignoring
 
     signal(SIGTERM, default_int_handler)
-    yield f"{', '.join(bench.rigs)}: {bench.url}"
-    yield "Open this address in a browser; take control, then start. Logs and reports are kept in " + str(bench.folder)
+    if bench.instructor_url:
+        yield f"Instructor of {len(bench.rigs)} students: {bench.instructor_url}"
+        yield f"Students, each of whom chooses their name: {bench.url}"
+        yield (
+            "Open the first address yourself: it shows everybody, and stops everybody. Hand out the second one"
+            f"{'' if bench.lan else '; only this machine is answered, others with --lan'}."
+        )
+        yield f"Logs and reports are kept in {bench.folder}, a folder for each student."
+    else:
+        yield f"{', '.join(bench.rigs)}: {bench.url}"
+        yield f"Open this address in a browser; take control, then start. Logs and reports are kept in {bench.folder}"
     yield "Ctrl-C stops every rig and closes the bench. Keep a stop in hardware within reach: this is software."
     try:
         bench.wait()
@@ -41,8 +50,8 @@ def _until_closed(bench: Bench) -> Iterator[str]:
 
 @command(
     "Control",
-    metavars={"rigs": "RIG.toml", "law": "DESIGN.json", "port": "N"},
-    names={"law": "--law"},
+    metavars={"rigs": "RIG.toml", "law": "DESIGN.json", "port": "N", "roster": "ROSTER.csv"},
+    names={"law": "--law", "roster": "--class"},
     defaults={"out": "upright-bench"},
     ranges={"port": (0, 65535)},
     lines=_until_closed,
@@ -50,11 +59,13 @@ def _until_closed(bench: Bench) -> Iterator[str]:
     upright bench
     upright bench RIG.toml --law design.json
     upright bench RIG.toml --law design.json --lan     other machines too, with the token that it prints
+    upright bench --class roster.csv --lan             a twin for each student, and a page that shows them all
     """,
 )
 def bench(
     rigs: Sequence[PathLike] | PathLike | None = None, *, law: Sequence[PathLike] | PathLike | None = None,
-    port: int = 8431, lan: bool = False, browser: bool = True, fifo: bool = True, out: PathLike | None = None,
+    roster: PathLike | None = None, port: int = 8431, lan: bool = False, browser: bool = True, fifo: bool = True,
+    out: PathLike | None = None,
 ) -> Bench:  # fmt: skip
     """Open the laboratory in a browser: start, tap and stop rigs, drag their poles, keep their runs.
 
@@ -67,6 +78,9 @@ def bench(
         RIG.toml of each rig.
     law : path or sequence of path, optional
         design.json for each rig, in their order; twins without one have one proposed.
+    roster : path, optional
+        Names of a class, a line each below a header ``name``, with a ``seed`` where wanted: each has a twin of their
+        own.
     port : int
         Of the address; 0 for any that is free.
     lan : bool
@@ -102,9 +116,17 @@ def bench(
         raise BadInput(
             f"the bench needs the bench extra ({error.name} is not installed): pip install 'upright[bench]'."
         ) from None
-    opened = open_bench(rig_files, laws, kept, port=port, lan=lan, fifo=fifo)
+    opened = open_bench(
+        rig_files,
+        laws,
+        kept,
+        port=port,
+        lan=lan,
+        fifo=fifo,
+        **({} if roster is None else {"roster": path_of(roster, "the list of a class")}),
+    )
     if browser:
         import webbrowser
 
-        webbrowser.open(opened.url)
+        webbrowser.open(opened.instructor_url or opened.url)
     return opened

@@ -1,0 +1,72 @@
+"""The log and the report of a lane's run, once it is over: until then its rows stand in a file beside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from upright.browser.runs import write_report
+from upright.errors import UprightError
+from upright.laws import Law
+from upright.logs.layout import RunFile
+from upright.realtime.session import RunEnd, log_header
+from upright.rigs.protocol import Mode
+from upright.running.run import PreparedRun
+
+NO_REPORT = "The bench was closed before its report was written; its log is kept."
+
+
+def rows_of(log: Path) -> Path:
+    """Where the rows stand until there is a log of them."""
+    return log.with_suffix(".rows")
+
+
+def write_lane_report(
+    run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law, without: bool = False
+) -> str:
+    """Write the log of a run, then its report, unless it is to do without; the verdict.
+
+    Raises
+    ------
+    UprightError
+        Without the report.
+    """
+    path = run.order.log
+    if end.about is None or not end.ticks:
+        path.unlink(missing_ok=True)
+    else:
+        _write_log(run, end, started, units, law)
+    rows_of(path).unlink(missing_ok=True)
+    if without:
+        raise UprightError(NO_REPORT)
+    return write_report(run, end, started)
+
+
+def _write_log(run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law) -> None:
+    assert end.about is not None  # as was just asked
+    header = log_header(run.order, end.about, units, law, started)
+    n, followed = len(units), bool(run.order.references)
+    kept = np.fromfile(
+        rows_of(run.order.log),
+        dtype=[("tick", "<i8"), ("counts", "<i8", (n,)), ("command", "<f8"), ("reference", "<f8")],
+    )
+    events = list(end.events)
+    with open(run.order.log, "wb") as stream:
+        file = RunFile(stream, header)
+        for k, row in enumerate(kept):
+            t = float(row["tick"]) * end.about.period
+            while events and events[0][0] < t:
+                file.event(*events.pop(0))
+            counts = row["counts"].tolist()
+            readings = [c / per for c, per in zip(counts, end.about.counts, strict=True)]
+            command = float(row["command"])
+            file.row(
+                (t, int(row["tick"]), *counts, *readings, *([float(row["reference"])] * followed), command, command,
+                 int(Mode.HOST), 0)
+            )  # fmt: skip
+            if k % 1000 == 999:
+                file.flush()
+        if end.stopped:
+            file.event(end.ticks * end.about.period, "fault", end.stopped)
+        file.finish()
