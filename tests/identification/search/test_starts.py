@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, dlsim
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.closed_loop.structures import ClosedLoop, pid
 from upright.identification.model.grey_box import base_values
+from upright.identification.model.runs import Run
 from upright.identification.search.starts import friction_from_energy, observe, regress, samples_of, turning_points
-from upright.physics import Furuta, Pendulum
+from upright.physics import Furuta, Pendulum, find
 from upright.signals.smoothing import dominant_period, savitzky_golay
 
 
@@ -45,6 +47,26 @@ def test_accelerations_give_the_furuta_from_any_guess(factor: float) -> None:
     assert found.unexplained < 0.01
     for n in ("J_d", "l_cg", "b_1"):
         assert found.values[n] == pytest.approx(FURUTA[n], rel=0.06)
+
+
+def test_guesses_thousands_of_times_beside_the_inertia_that_is_given_still_lead_to_the_flexible_link() -> None:
+    """A hub of 1 kg m^2 whose link was guessed at 0.2 g m^2; the log by SciPy, its counts 4096 to a turn."""
+    J_l, k_s, b_1, b_2, gain, dt, n = 0.9, 600.0, 40.0, 0.4, 70.0, 0.004, 2000
+    per_torque, both = np.array([0.0, 1.0, 0.0, -1.0]), 1 + 1 / J_l
+    A = np.array([[0, 1, 0, 0], [0, -b_1, k_s, b_2], [0, 0, 0, 1], [0, b_1, -k_s * both, -b_2 * both]])
+    u = 2 * np.sign(np.sin(4.5 * dt * np.arange(n)))
+    _, x, _ = dlsim(cont2discrete((A, gain * per_torque[:, None], np.eye(4), np.zeros((4, 1))), dt), u)
+    count = 2 * np.pi / 4096
+    run = Run(label="log", role="fit", t=dt * np.arange(n), u=u[:, None], measured=("theta", "alpha"),
+              y=np.round(x[:, [0, 2]] / count) * count, resolution=(count, count))  # fmt: skip
+    beside = {"J_l": 2e-4, "k_s": 0.14, "b_1": 1e-5, "b_2": 1e-5, "actuator.gain": 0.07}
+    truth = {"J_h": 1.0, "J_l": J_l, "k_s": k_s, "b_1": b_1, "b_2": b_2, "actuator.gain": gain}
+    asked = rig(find("flexible-link"), truth, beside)
+    asked.parameters["actuator.gain"] = replace(asked.parameters["actuator.gain"], unit="(N m)/V")
+    (sample,) = samples_of(asked, [run])
+    found = regress(asked, [sample])
+    for n in ("J_l", "k_s", "b_1", "actuator.gain"):
+        assert found.values[n] == pytest.approx(truth[n], rel=0.3)  # a start; counts are 4 % of the deflection
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 3.0])

@@ -22,7 +22,7 @@ from upright.identification.model.grey_box import GreyBox, base_values
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import Normal, finite
 from upright.identification.problem.unknowns import Unknown, shared_unknowns
-from upright.identification.search.descent import descend
+from upright.identification.search.descent import Descent, descend
 from upright.physics.actuator import ACTUATOR, drive_force
 from upright.physics.equations import Derived, evaluated, mass_and_force
 from upright.physics.plant import Plant
@@ -184,7 +184,7 @@ def regress(rig: GreyBox, samples: list[Sample], *, tolerance: float = 1e-5) -> 
     unknowns = [u for u in shared_unknowns(rig) if u.estimated]
     base = base_values(rig)
     count = sum(s.measured[0].size for s in samples)
-    x0 = np.array([_coordinate(u, base[u.name]) for u in unknowns])
+    lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
     scale = np.array([u.scale for u in unknowns])
     log = np.array([u.log for u in unknowns], dtype=bool)
 
@@ -198,17 +198,61 @@ def regress(rig: GreyBox, samples: list[Sample], *, tolerance: float = 1e-5) -> 
         except np.linalg.LinAlgError:
             return np.full(count, np.inf)
 
-    def pulled(x: Array) -> Array:
-        # a faint pull towards the start keeps numbers that the accelerations cannot see where they were
-        return np.concatenate([residual(x), 1e-3 * math.sqrt(count) * (x - x0) / scale])
+    def descended(start: Mapping[str, float], scale: Array) -> Descent:
+        x0 = np.clip([_coordinate(u, start[u.name]) for u in unknowns], lower, upper)
 
-    def normal(x: Array) -> Normal:
-        return Normal.by_differences(pulled, x, 1e-5 * np.where(log, 1.0, np.maximum(np.abs(x), scale)))
+        def pulled(x: Array) -> Array:
+            # a faint pull towards the start keeps numbers that the accelerations cannot see where they were
+            return np.concatenate([residual(x), 1e-3 * math.sqrt(count) * (x - x0) / scale])
 
-    lower, upper = (np.array([u.bounds[k] for u in unknowns]) for k in (0, 1))
-    end = descend(normal, x0, lower, upper, tolerance=tolerance, limit=40)
+        def normal(x: Array) -> Normal:
+            return Normal.by_differences(pulled, x, 1e-5 * np.where(log, 1.0, np.maximum(np.abs(x), scale)))
+
+        return descend(normal, x0, lower, upper, tolerance=tolerance, limit=40)
+
+    end = descended(base, scale)
+    sized = _proportionate(rig, samples[0])
+    if sized:
+        sizes = [1.0 if u.log else abs(sized.get(u.name, 0.0)) for u in unknowns]
+        other = descended(base | sized, np.where(sizes, sizes, scale))
+        end = other if other.normal.cost < PLAINLY * end.normal.cost else end
     r = residual(end.x)
     return Agreement(values=values(end.x), unexplained=float(np.mean(r * r)) if finite(r) else math.inf)
+
+
+PLAINLY = 0.9
+"""Share of the squares that another start must leave at most to be followed."""
+
+
+FRICTION = ("N", "N m", "N s/m", "N m s/rad")
+"""Units of its terms."""
+BESIDE = 30.0
+"""Factor by which a guess may be larger or smaller than what the motion asks for."""
+
+
+def _proportionate(rig: GreyBox, sample: Sample) -> dict[str, float]:
+    """Inertias, springs, friction and gain of one size, as the sample's period, speeds and accelerations have it.
+
+    Nothing where the guesses are of that size. Where one is thousands of times beside the inertia that is given, the
+    descent from there ends in a valley.
+    """
+    held = {p.unit: p.value for p in rig.parameters.values() if not p.estimate and p.value > 0}
+    w, a = 2 * math.pi / sample.period, float(np.sqrt(np.mean(sample.measured[0] ** 2)))
+    u = float(np.sqrt(np.mean(sample.u**2)))
+    sizes: dict[str, float] = {}
+    for inertia, force, spring, damping in (
+        ("kg", "N", "N/m", "N s/m"), ("kg m^2", "N m", "N m/rad", "N m s/rad"),
+    ):  # fmt: skip
+        if m := held.get(inertia):
+            sizes |= {inertia: m, spring: m * w**2, damping: 0.1 * m * w, force: 0.1 * m * a}
+            sizes |= {f"{of}/{unit}": m * a / u for of in (force, f"({force})") for unit in ("V", "A") if u}
+    asked = {p.name: p for p in rig.parameters.values() if p.estimate and p.unit in sizes}
+    firm = [
+        p for p in asked.values() if not p.unit.startswith("N") or p.unit in ("N/m", "N m/rad")
+    ]  # friction may be small
+    if all(sizes[p.unit] / BESIDE < abs(p.value) < sizes[p.unit] * BESIDE for p in firm):
+        return {}
+    return {name: math.copysign(sizes[p.unit], p.value or 1.0) for name, p in asked.items()}
 
 
 def _coordinate(u: Unknown, value: float) -> float:
