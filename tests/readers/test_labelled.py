@@ -53,6 +53,20 @@ def test_however_numbers_are_labelled_the_log_is_the_same(way):
     np.testing.assert_array_equal(log["turns"], PLAIN["turns"])
 
 
+@pytest.mark.parametrize("mark", [" ", ",", "; "])
+def test_letters_may_stand_before_their_numbers(mark):
+    log = record(rows(lambda t, a, n: mark.join([f"T{t:.2f}", f"A{a:.4f}", f"N{n}"])))
+    np.testing.assert_allclose(log.t, PLAIN.t, rtol=0, atol=1e-12)
+    assert log.names == ("A", "N")
+    np.testing.assert_array_equal(log["A"], PLAIN["theta (rad)"])
+    np.testing.assert_array_equal(log["N"], PLAIN["turns"])
+
+
+def test_names_that_end_in_a_number_are_names():
+    log = record(rows(lambda t, a, n: f"{t:.2f},{a:.4f},{n}", "t0,theta1,theta2"))
+    assert log.names == ("theta1", "theta2")
+
+
 ARRIVED = [f"15:03:{12 + 1.003 * t:06.3f} -> " for t in T]
 
 

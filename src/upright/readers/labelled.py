@@ -1,7 +1,8 @@
 """Rows in which numbers have their name or unit beside them, as bare numbers: what serial monitors and plotters show.
 
-``theta:0.31,psi:-2``, ``time = 0.01 s; angle = 3,1 deg``, ``{"t": 0.01, "theta": 0.31}``, ``(0.01, 0.31)``, and
-MATLAB's ``0.01 sec,0.31``. Arduino's monitor may have put the time of arrival before them, ``15:03:12.345 -> ``.
+``theta:0.31,psi:-2``, ``time = 0.01 s; angle = 3,1 deg``, ``{"t": 0.01, "theta": 0.31}``, ``(0.01, 0.31)``,
+``T10 C512 U-3``, and MATLAB's ``0.01 sec,0.31``. Arduino's monitor may have put the time of arrival before them,
+``15:03:12.345 -> ``.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ _CELL = re.compile(
     r"\s*(?P<unit>[^\W\d_][\w/*^²³·.-]*|[°%][\w/]*)?\s*",
     re.IGNORECASE,
 )
+_LETTERED = re.compile(rf"\s*(?P<name>[^\W\d_]+)(?P<number>{_NUMBER})(?P<unit>)\s*")
 _BESIDE = re.compile(r"\s+(?=[^\W\d][^\s:=]*\s*[:=])")
 _ARRIVED = re.compile(r"^(\d\d:\d\d:\d\d[.,]\d{3}) -> ?", re.MULTILINE)
 _ROWS = 1000  # lines that show whether the first column is a clock
@@ -32,14 +34,16 @@ Label = tuple[str, str]
 
 def bare_rows(text: str) -> tuple[str, tuple[Label, ...]]:
     """The text with rows of bare numbers, line for line, and what they stated of each; nothing where they are bare."""
-    rows = [_Row(line) for line in text[: _LOOKED * 400].split("\n", _LOOKED)[:_LOOKED]]
+    lines = text[: _LOOKED * 400].split("\n", _LOOKED)[:_LOOKED]
+    lettered = sum(bool(_Row(line, lettered=True).cells) for line in lines) > len(lines) / 2  # theta1 is a name too
+    rows = [_Row(line, lettered=lettered) for line in lines]
     stated = Counter(row.labels for row in rows if row.cells)
     if not any(row.bracketed or any(map(any, row.labels)) for row in rows if row.cells):
         return text, ()
     labels, _ = stated.most_common(1)[0]
 
     def bare(line: str) -> str:
-        row = _Row(line)
+        row = _Row(line, lettered=lettered)
         return row.numbers if row.labels == labels else line
 
     return "\n".join(map(bare, text.split("\n"))), labels
@@ -48,14 +52,13 @@ def bare_rows(text: str) -> tuple[str, tuple[Label, ...]]:
 class _Row:
     """Cells of a line; none where one of them is no number with its name and unit."""
 
-    def __init__(self, line: str) -> None:
+    def __init__(self, line: str, *, lettered: bool) -> None:
         inside = line.strip().removesuffix(",")
         self.bracketed = inside[:1] in _BRACKETS and inside[-1:] == _BRACKETS[inside[:1]]
         inside = inside[1:-1] if self.bracketed else inside
         self.apart = _mark(inside)
-        matches = [
-            _CELL.fullmatch(cell) for cell in (inside.split(self.apart) if self.apart else _BESIDE.split(inside))
-        ]
+        parts = inside.split(self.apart) if self.apart else inside.split() if lettered else _BESIDE.split(inside)
+        matches = [(_LETTERED if lettered else _CELL).fullmatch(part) for part in parts]
         self.cells = [cell for cell in matches if cell] if all(matches) else []
 
     @property
