@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import upright as up
 from upright.errors import BadInput
 from upright.report.page import Chapter, Part, Picture
 from upright.verbs.answer import Answer
@@ -188,3 +189,11 @@ def test_an_answer_draws_its_first_picture_or_the_one_that_is_named():
         answer.report("page.txt")
     with pytest.raises(AttributeError):
         answer._hidden  # noqa: B018
+
+
+def test_the_value_of_a_fit_alone_is_refused_with_what_to_hand_over():
+    """It lacks the study that the answer has."""
+    from upright.identification import Fit
+
+    with pytest.raises(BadInput, match=r"got Fit\. Give the whole answer of up\.identify, without \.value"):
+        up.design(object.__new__(Fit))

@@ -96,7 +96,10 @@ def _file(source: Any, verb: str) -> Path:
         return written
     if isinstance(source, type):
         raise BadInput(f"{verb} needs numbers: {source.__name__}(...), or what up.identify answered.")
+    from upright.identification import Fit
+
+    alone = " Give the whole answer of up.identify, without .value." if isinstance(source, Fit) else ""
     raise BadInput(
         f"{verb} takes what up.identify answered, a fit.json or its folder, a study, an MJCF file, a rig or a plant "
-        f"with numbers, got {type(source).__name__}."
+        f"with numbers, got {type(source).__name__}.{alone}"
     )
