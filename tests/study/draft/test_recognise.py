@@ -93,6 +93,11 @@ FURUTA = "Two angles were taken for arm and pendulum of a Furuta pendulum."
         ([COUNTS[0], LENGTHS[0]], None, "rectilinear-1", "Positions were taken for carts on springs."),
         (ANGLES[:1], None, "pendulum", ""),
         (ANGLES[:1], DRIVE, "pendulum", "One angle was taken for a pendulum on a fixed pivot."),
+        ([col("position", "deg", high=1800.0)], DRIVE, "torsional-1",
+         "'position' turns 5 times: taken for a disk; otherwise --plant pendulum."),
+        ([col("position", "rad", high=6.0 * math.pi)], DRIVE, "pendulum",
+         "One angle was taken for a pendulum on a fixed pivot."),
+        ([col("position", "deg", high=1800.0)], None, "pendulum", ""),
         ([COUNTS[0], ANGLES[0]], None, "pendulum", ""),
     ],
 )  # fmt: skip

@@ -108,7 +108,8 @@ def read_chain(
     signal = record[reference.name] if reference is not None else u
     at = int(np.argmax(signal != 0)) if signal[0] == 0 else 0
     reversed_ = drive is not None and not follows(t, u, first, at)
-    if not named:
+    counted = not {c.guess for c in columns} & (ANGLES | LENGTHS).keys()  # which does not distinguish carts from disks
+    if counted and not named:
         kind, why = chain_kind(record, columns, drive, reversed_, path)
         plant = f"{kind}-{len(columns)}"
         other = "torsional" if kind == "rectilinear" else "rectilinear"

@@ -314,8 +314,17 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
         return "furuta", "Two angles were taken for arm and pendulum of a Furuta pendulum."
     if lengths:
         return f"rectilinear-{min(len(lengths), 3)}", "Positions were taken for carts on springs."
-    doubt = "One angle was taken for a pendulum on a fixed pivot." if drive is not None else ""
-    return "pendulum", doubt
+    if drive is None:
+        return "pendulum", ""
+    one = angles[0]
+    turns = ANGLES[one.guess] * (one.high - one.low) / (2 * math.pi)
+    if turns > SPINS:
+        return "torsional-1", f"'{one.name}' turns {turns:.0f} times: taken for a disk; otherwise --plant pendulum."
+    return "pendulum", "One angle was taken for a pendulum on a fixed pivot."
+
+
+SPINS = 3.0
+"""Turns of a driven angle beyond which nothing hangs on it."""
 
 
 def named_after(places: list[Column]) -> str:
