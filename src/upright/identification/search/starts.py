@@ -247,9 +247,7 @@ def _proportionate(rig: GreyBox, sample: Sample) -> dict[str, float]:
             sizes |= {inertia: m, spring: m * w**2, damping: 0.1 * m * w, force: 0.1 * m * a}
             sizes |= {f"{of}/{unit}": m * a / u for of in (force, f"({force})") for unit in ("V", "A") if u}
     sought = {p.name: p for p in rig.parameters.values() if p.estimate and p.unit in sizes}
-    firm = [
-        p for p in sought.values() if not p.unit.startswith("N") or p.unit in ("N/m", "N m/rad")
-    ]  # friction may be small
+    firm = [p for p in sought.values() if p.unit not in FRICTION]  # which may be as small as it likes
     if all(sizes[p.unit] / BESIDE < abs(p.value) < sizes[p.unit] * BESIDE for p in firm):
         return {}
     return {name: math.copysign(sizes[p.unit], p.value or 1.0) for name, p in sought.items()}
