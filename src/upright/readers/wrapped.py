@@ -21,12 +21,12 @@ def unwrapped(values: Array) -> tuple[Array, int, int]:
     The readings as they are, and 0 of each, where they are those of no such counter.
     """
     low, high = float(values.min()), float(values.max())
-    steps = np.abs(np.diff(values))
     for bits in BITS:
         whole = 2.0**bits
         within = (low >= -whole / 2 and high < whole / 2) or (low >= 0 and high < whole)
         if not within or high - low < FULL * whole:
             continue
+        steps = np.abs(np.diff(values))
         jumps = steps > (1 - SWIFT) * whole
         if not jumps.any() or (steps[~jumps] > SWIFT * whole).any() or (values != np.round(values)).any():
             return values, 0, 0
