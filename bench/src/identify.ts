@@ -20,6 +20,8 @@ interface Log {
 
 interface Fitted {
   id: string;
+  log: string;
+  of: string;
   name: string;
   since: number;
   verdict: string;
@@ -41,6 +43,8 @@ interface Facts {
   rests: string[];
   plant: string;
   assessments: { question: string; state: string; tone: string; why: string }[];
+  /** Numbers that nobody measured, and that were taken to be so. */
+  assumed: { name: string; meaning: string; value: string }[];
   parameters: { symbol: string; meaning: string; value: string; interval: string; unit: string; status: string; tone: string }[];
   curves: {
     run: string; role: "fit" | "predict"; signal: string; unit: string; meaning: string; fit: string; from: number;
@@ -84,6 +88,7 @@ export class Identify {
     press("fit-interrupt", () => void this.order("DELETE", "fits"));
     press("fit-report", () => this.report());
     press("fit-motions", record);
+    press("fit-again", () => void this.again());
     byId("fit-log").addEventListener("change", () => this.about());
     byId("fit-file").addEventListener("change", ({ currentTarget }) => {
       const input = currentTarget as HTMLInputElement, file = input.files?.[0];
@@ -130,6 +135,7 @@ export class Identify {
     byId("fit-interrupt").hidden = !now;
     byId("fit-begin").hidden = !!now;
     lock(byId("fit-interrupt"), session.unsteerable);
+    lock(byId("fit-again"), session.unsteerable || busy || (now ? "A log is being identified." : ""));
     byId<HTMLInputElement>("fit-file").disabled = session.unsteerable !== "" || busy !== "";
     byId("fit-going").hidden = !now;
     if (now) {
@@ -207,6 +213,15 @@ export class Identify {
     if (await this.order("POST", "fits", JSON.stringify({ log, of }))) await this.show();
   }
 
+  /** The log of the fit that is shown once more, with what was measured meanwhile. */
+  private async again(): Promise<void> {
+    const fit = this.identified?.fits.find((each) => each.id === this.shown), known: Record<string, string> = {};
+    for (const input of byId("fit-assumed").querySelectorAll("input")) if (input.value.trim()) known[input.name] = input.value.trim();
+    if (!fit) return;
+    if (!Object.keys(known).length) return this.say("Type what you measured first, with its unit.");
+    if (await this.order("POST", "fits", JSON.stringify({ log: fit.log, of: fit.of, known }))) await this.show();
+  }
+
   private async open(id: string): Promise<void> {
     const answer = await fetch(`/rigs/${encodeURIComponent(this.session.name)}/fits/${id}.json`).catch(() => undefined);
     if (!answer?.ok) return;
@@ -230,6 +245,9 @@ export class Identify {
       make("td", { class: "number" }, `${p.value} ${p.unit}`, make("span", { class: "meaning" }, p.interval)),
       make("td", {}, make("span", { class: `badge ${p.tone}` }, p.status)))));
     byId("fit-rests").replaceChildren(...[...facts.rests, ...facts.warnings, ...facts.windows].map((text) => make("li", {}, text)));
+    byId("fit-measure").hidden = facts.assumed.length === 0;
+    byId("fit-assumed").replaceChildren(...facts.assumed.map(({ name, meaning, value }) => make("label", { class: "field" },
+      make("span", {}, ...printed(name), ` ${meaning}`), make("input", { type: "text", name, maxlength: "60", placeholder: value }))));
     byId<HTMLAnchorElement>("fit-file-link").href = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.fit`;
     byId("fit-pictures").replaceChildren(...facts.curves.flatMap((curve) => {
       const { unit } = shownUnit(curve.unit), name = short(curve.meaning), how = curve.ahead ? `, ${curve.ahead} s ahead` : "";

@@ -103,13 +103,13 @@ def test_one_fit_at_a_time_and_an_interrupt_reaches_it(made):
     with pytest.raises(BadInput, match="nothing is being identified"):
         fits.interrupt()
     with pytest.raises(BadInput, match="no such log"):
-        fits.begin("../../etc/passwd", OWN)
+        fits.begin("../../etc/passwd", OWN, {})
     fits.keep("swing.csv", b"1 2")
     carry.hold()
     carry.answer = BadInput("nothing moves.")
-    fits.begin("log-1", "columns")
+    fits.begin("log-1", "columns", {})
     with pytest.raises(BadInput, match="another log is being identified"):
-        fits.begin("log-1", "columns")
+        fits.begin("log-1", "columns", {})
     carry.progress("first 1 s", 0.2)
     now = fits.described()["now"]
     assert (now["name"], now["step"]) == ("swing.csv", "first 1 s")
@@ -126,10 +126,10 @@ def test_of_a_brought_log_its_columns_tell_the_rig_unless_somebody_says_it_is_th
     fits.keep("swing.csv", b"1 2")
     for of, expected in (("columns", None), (OWN, rig.rig_path)):
         carry.answer = BadInput("nothing moves.")
-        fits.begin("log-1", of)
+        fits.begin("log-1", of, {"m_p": "1 kg"})
         assert settled(fits, lambda each: each.described()["now"] is None)
-        path, name, known, target = carry.calls[-1]
-        assert (path, name, known) == (folder / "uploads/log-1.log", "swing.csv", expected)
+        path, name, known, measured, target = carry.calls[-1]
+        assert (path, name, known, measured) == (folder / "uploads/log-1.log", "swing.csv", expected, {"m_p": "1 kg"})
         assert target.parent == folder / "fits"
 
 
@@ -158,9 +158,17 @@ def test_what_is_no_request_for_a_fit_is_answered_by_one_that_is(bench):
         for body in (
             b"", b"{}", b"[]", b"1", b"nonsense", b"\xff", b'{"log": 1, "of": "rig"}', b'{"log": "run", "of": "moon"}',
             b'{"log": "run", "of": ["rig"]}', b"[" * 4000,
+            b'{"log": "run", "of": "rig", "known": 1}', b'[{"log": "run"}]',
         ):  # fmt: skip
             status, _, text = ask(bench, "api/rigs/furuta/fits", page.me, data=body)
             assert (status, '{"log": "run", "of": "rig"}' in text) == (400, True)
+
+
+def test_what_was_measured_is_a_text_by_its_name(bench):
+    with client(bench) as page:
+        for known in ({"m_p": 1}, {"m_p": ["1 kg"]}, {"m_p": "1" * 200}):
+            body = json.dumps({"log": "run", "of": "rig", "known": known}).encode()
+            assert '"m_p": "0.22 kg"' in ask(bench, "api/rigs/furuta/fits", page.me, data=body)[2]
 
 
 def test_more_than_may_come_is_refused_before_it_comes(bench):

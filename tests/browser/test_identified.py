@@ -53,7 +53,7 @@ def test_first_motions_keep_the_arm_near_the_middle_and_leave_the_pendulum_nearl
 def test_the_numbers_of_a_twin_are_recovered_from_its_first_motions(recorded, tmp_path):
     """Which differ from those of its design by up to a quarter; each interval that says 95 % is taken twice as wide."""
     folder, rig, _ = recorded
-    verdict = identify_log(folder / "furuta/run.mcap", "run.mcap", rig.rig_path, tmp_path / "fit", silent)
+    verdict = identify_log(folder / "furuta/run.mcap", "run.mcap", rig.rig_path, {}, tmp_path / "fit", silent)
     assert verdict.startswith("Rely on this model")
     truth = make_rig("furuta", SEED)
     true = {**truth.plant.parameters(), "actuator.gain": truth.gain, "actuator.lag": truth.lag}
@@ -202,6 +202,18 @@ def test_a_log_that_is_none_is_refused_and_a_stranger_s_is_identified(server, ch
         one.reads("#fit-about", "10,442 rows")
         page.click("#fit-begin")
         identified(one, ".")
+        assumed = {box.get_attribute("name") for box in page.locator("#fit-assumed input").all()}
+        assert {"m_p", "J_p"} <= assumed
+        page.click("#fit-again")
+        one.reads("#fit-status", "Type what you measured first")
+        page.fill("#fit-assumed input[name=m_p]", "0.2 parsec")
+        page.click("#fit-again")
+        one.reads("#fit-status", "parsec")
+        page.fill("#fit-assumed input[name=m_p]", "0.2 kg")
+        page.click("#fit-again")
+        one.reads("#fit-status", "Identifying")
+        one.reads("#fit-status", "The fit is written")
+        page.wait_for_selector("#fit-assumed input[name=m_p]", state="detached")  # it is assumed no more
         one.leaves()
         assert [text for text in one.wrong if "400" not in text] == []
 

@@ -6,7 +6,7 @@ import json
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -90,8 +90,8 @@ class Identifications:
         brought = [_read(path) for path in (self._folder / "uploads").glob("log-*.json")]
         return runs + [{**b, "own": False} for b in sorted(brought, key=lambda b: -b["brought"])]
 
-    def begin(self, log: str, of: str) -> None:
-        """Begin to identify a log.
+    def begin(self, log: str, of: str, measured: Mapping[str, str]) -> None:
+        """Begin to identify a log, of whose rig some numbers were measured.
 
         Raises
         ------
@@ -110,11 +110,18 @@ class Identifications:
             key = f"fit-{max(taken, default=0) + 1}"
             rig = self._rig.rig_path if known["own"] or of == OWN else None
             self._job = self._carry(
-                begin_identification, path, name, rig, self._folder / "fits" / key, seconds=FITTING, grace=GRACE,
-                progress=self._progress,
+                begin_identification, path, name, rig, dict(measured), self._folder / "fits" / key,
+                seconds=FITTING, grace=GRACE, progress=self._progress,
             )  # fmt: skip
             self._failed = ""
-            self._now = {"id": key, "log": log, "name": _name(known), "step": "starting", "since": time.time()}
+            self._now = {
+                "id": key,
+                "log": log,
+                "of": of,
+                "name": _name(known),
+                "step": "starting",
+                "since": time.time(),
+            }
         threading.Thread(target=self._run, args=(self._job, dict(self._now)), name=key, daemon=True).start()
 
     def interrupt(self) -> None:
@@ -163,7 +170,7 @@ class Identifications:
         failed = ""
         try:
             verdict = job.run()
-            kept = {**{n: now[n] for n in ("id", "log", "name", "since")}, "verdict": verdict}
+            kept = {**{n: now[n] for n in ("id", "log", "of", "name", "since")}, "verdict": verdict}
             replace_file(self._folder / "fits" / now["id"] / f"{now['id']}.json", json.dumps(kept).encode())
         except UprightError as error:
             failed = str(error)

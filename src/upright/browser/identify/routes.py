@@ -21,6 +21,7 @@ WHO = "x-bench-me"
 """Header by which a page says who it is; no page of another site can send it."""
 SLOWEST = 120.0
 """Time for a log to come [s]."""
+_TEXT = 100
 FILES = {"html": ("report.html", "text/html"), "json": ("facts.json", "application/json"),
          "fit": ("fit.json", "application/json")}  # fmt: skip
 """By the ending of an address."""
@@ -69,8 +70,8 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list
         return JSONResponse(await asyncio.to_thread(own.keep, name, data))
 
     async def begin(request: Request, own: Identifications) -> Response:
-        log, of = _wanted(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
-        await asyncio.to_thread(own.begin, log, of)
+        log, of, measured = _wanted(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
+        await asyncio.to_thread(own.begin, log, of, measured)
         return JSONResponse({})
 
     async def interrupt(_: Request, own: Identifications) -> Response:
@@ -86,16 +87,18 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list
     ]
 
 
-def _wanted(text: bytes) -> tuple[str, str]:
-    """Which log a fit is to be of, and who says what rig it was."""
+def _wanted(text: bytes) -> tuple[str, str, dict[str, str]]:
+    """Which log a fit is to be of, who says what rig it was, and what of that was measured."""
     try:
         content: Any = json.loads(text)
-        log, of = content["log"], content["of"]
-    except (ValueError, RecursionError, KeyError, TypeError):
-        log, of = None, None
+        log, of, known = content["log"], content["of"], dict(content.get("known", {}))
+    except (ValueError, RecursionError, KeyError, TypeError, AttributeError):
+        log, of, known = None, None, {}
     if not isinstance(log, str) or of not in (OWN, COLUMNS):
         raise BadInput(f'a fit is begun by {{"log": "run", "of": "{OWN}"}}, or of its "{COLUMNS}".')
-    return log, of
+    if not all(isinstance(text, str) and len(text) <= _TEXT for pair in known.items() for text in pair):
+        raise BadInput('what was measured is a text by its name, such as {"m_p": "0.22 kg"}.')
+    return log, of, known
 
 
 def _operates(hub: Hub, who: str) -> None:

@@ -25,7 +25,7 @@ from upright.report.drawing import decimated
 from upright.report.fit.chapter import chapter
 from upright.report.fit.tables import parameter_table
 from upright.report.html import tone, write_html
-from upright.report.symbols import percent
+from upright.report.symbols import number, percent, unit
 from upright.rig.makes import make_named
 from upright.rigs.rigfile import read_rig_file
 from upright.running.rig import model_and_truth
@@ -38,13 +38,17 @@ BUCKETS = 300
 """Of a curve in the page; a bucket has its least and its greatest sample."""
 
 
-def identify_log(path: Path, name: str, rig: Path | None, folder: Path, progress: Progress) -> str:
+def identify_log(
+    path: Path, name: str, rig: Path | None, measured: Mapping[str, str], folder: Path, progress: Progress
+) -> str:
     """Fit a log, and write fit.json, report.html and what the page shows into a folder; the verdict.
 
     Parameters
     ----------
     rig : Path or None
         RIG.toml of the rig that was logged; None where the columns are to tell what it was.
+    measured : mapping of str to str
+        Numbers that somebody measured, with their units.
 
     Raises
     ------
@@ -53,7 +57,7 @@ def identify_log(path: Path, name: str, rig: Path | None, folder: Path, progress
     """
     progress("reading the log", 0.0)
     record = record_named(path, name)
-    study = study_of_record(record) if rig is None else _study_of_rig(record, rig)
+    study = study_of_record(record, known=measured) if rig is None else _study_of_rig(record, rig, measured)
     study = _tested(study)
     if not study.model.estimated:
         raise BadInput(f"every number of {study.title} is known, so that nothing is left to estimate.")
@@ -69,13 +73,17 @@ def identify_log(path: Path, name: str, rig: Path | None, folder: Path, progress
         "assessments": [
             {"question": a.question, "state": a.state, "tone": tone(a.state), "why": a.why} for a in page.assessments
         ],
+        "assumed": [
+            {"name": n, "meaning": p.meaning, "value": f"{number(p.value)} {unit(p.unit)}".strip()}
+            for n, p in fit.model.parameters.items() if p.assumed
+        ],
         "parameters": _parameters(fit), "curves": _curves(fit),
     }  # fmt: skip
     replace_file(folder / "facts.json", json.dumps(plain_values(facts)).encode())
     return page.verdict
 
 
-def _study_of_rig(record: Record, path: Path) -> Study:
+def _study_of_rig(record: Record, path: Path, measured: Mapping[str, str]) -> Study:
     """The study of a log of a rig that the bench knows.
 
     Of a model of the laboratory it is known what a scale and a ruler tell, and how well; of any other what its
@@ -84,7 +92,7 @@ def _study_of_rig(record: Record, path: Path) -> Study:
     file = read_rig_file(path)
     model, truth = model_and_truth(file)
     if file.known is not None:
-        return study_of_record(record, model)
+        return study_of_record(record, model, known=measured)
     make = make_named(file.make)
     known, sought = dict[str, str](), dict[str, float | str]()
     driven = any(bool(record[name].any()) for name in record.inputs)
@@ -93,7 +101,8 @@ def _study_of_rig(record: Record, path: Path) -> Study:
             known[name] = f"{with_unit(p.value, p.unit, 10)} +- {with_unit(p.uncertainty, p.unit, 4)}"
         elif p.estimate and (driven or not name.startswith("actuator.")):
             sought[name] = p.value
-    return study_of_record(record, model, known=known, ask=sought)
+    sought = {name: value for name, value in sought.items() if name not in measured}
+    return study_of_record(record, model, known={**known, **measured}, ask=sought)
 
 
 def _tested(study: Study) -> Study:
