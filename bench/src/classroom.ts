@@ -38,7 +38,7 @@ export function decodeClass(buffer: ArrayBuffer): { late: number; students: Stud
 export function told({ state, operated, seconds }: StudentState): string {
   if (state === "idle") return operated ? "idle" : "nobody yet";
   if (state === "starting") return "starting";
-  return state === "running" ? `upright for ${seconds} s` : `${state} after ${seconds} s`;
+  return state === "running" ? `upright for ${seconds} s` : `${state} at ${seconds} s`;
 }
 
 const SHOWN: readonly Seen[] = ["running", "fell", "stopped", "idle"];
@@ -52,7 +52,7 @@ export function summed(students: StudentState[]): string {
 }
 
 const drawn = (): SVGElement => {
-  const svg = RigDrawing.make("svg", { viewBox: "-20 -20 40 24", "aria-hidden": "true" });
+  const svg = RigDrawing.make("svg", { viewBox: "-20 -20 40 40", "aria-hidden": "true" });
   RigDrawing.make("path", { class: "ground", d: "M-16 0H16" }, svg);
   RigDrawing.make("path", { class: "rod", d: "M0 0V-17" }, svg);
   return svg;

@@ -108,13 +108,14 @@ def take_class(folder: Path, server: Server) -> None:
         page = context.new_page()
         page.goto(server.instructor_url)
         page.get_by_text("50 upright").wait_for()
-        page.wait_for_timeout(8000)
+        page.wait_for_timeout(6000)
         for k in (3, 20, 41):
             sockets[k].send(json.dumps({"do": "tap", "coordinate": "theta", "speed": 12.0}))
         sockets[11].send(json.dumps({"do": "stop"}))
+        page.get_by_text("3 fell, 1 stopped").wait_for()
         for k in range(5, 50, 7):
             sockets[k].send(json.dumps({"do": "tap", "coordinate": "theta", "speed": 1.5}))
-        page.wait_for_timeout(700)
+        page.wait_for_timeout(500)
         page.screenshot(path=folder / "bench_class.png")
 
 

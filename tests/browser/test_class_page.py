@@ -67,7 +67,7 @@ def test_an_instructor_sees_who_fell_and_stops_everybody(server, chromium):
         bob.page.click("#tap")
         bob.sees("stopped")
         bob.reads("#latch-why", "it fell")
-        teacher.reads("#students a[data-state=fell]", r"Bob\s*fell after \d+ s")
+        teacher.reads("#students a[data-state=fell]", r"Bob\s*fell at \d+ s")
         teacher.reads("#summary", "1 upright, 1 fell, 2 idle")
         anne.sees("running")
         page.keyboard.press("Escape")
