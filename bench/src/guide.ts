@@ -184,8 +184,18 @@ export class Guide {
     const { facts, coordinates } = this.session.scene!, tap = () => this.session.steer({ do: "tap", coordinate: coordinates.at(-1)!.name, speed: TAP });
     const propose = () => { this.show("track"); this.track.propose({ shape: "step", value: this.step, period: 0 }); };
     const twin = this.session.scene!.kind === "TWIN";
+    const apply = (poles: Complex[], i: number) => {
+      let confirmed = twin;
+      const made = button(`Apply set ${i + 1}`, () => {
+        if (confirmed) this.session.steer({ do: "poles", poles, ...(twin ? {} : { confirm: true }) });
+        else say(made, `Confirm: apply set ${i + 1} to HARDWARE`);
+        confirmed = !confirmed || twin;
+        if (!confirmed) say(made, `Apply set ${i + 1}`);
+      });
+      return made;
+    };
     byId("guide-actions").replaceChildren(...(
-      task.answer === "sets" ? [...facts.sets.map((poles, i) => button(`Apply set ${i + 1}`, () => this.session.steer({ do: "poles", poles, ...(twin ? {} : { confirm: true }) }))), ...(twin ? [button(`Tap ${TAP}`, tap)] : [])]
+      task.answer === "sets" ? [...facts.sets.map(apply), ...(twin ? [button(`Tap ${TAP}`, tap)] : [])]
       : task.needs === "reference" ? [button("Show it on Track", propose)]
       : task.answer === "release" || task.answer === "tap" ? [button("Show Run", () => this.show("run"))]
       : []));
