@@ -29,8 +29,8 @@ def never_ends(progress):
 
 
 def ends_when_interrupted(progress):
-    progress("waiting", 0.0)
     try:
+        progress("waiting", 0.0)
         threading.Event().wait()
     except KeyboardInterrupt:
         finish()

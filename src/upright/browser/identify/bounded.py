@@ -79,14 +79,15 @@ class Bounded:
             ours.close()
 
     def _answer(self, pipe: Connection) -> str:
-        until, ready, interrupted = time.monotonic() + self._seconds, False, False
+        until, ready, interrupted, overdue = time.monotonic() + self._seconds, False, False, False
+        given_up = f"it took more than {self._seconds:g} s, and was given up."
         while True:
             late = time.monotonic() > until
             if ready and not interrupted and (late or self._stopping.is_set()):
-                interrupted, late, until = True, False, time.monotonic() + self._grace
+                interrupted, overdue, late, until = True, late, False, time.monotonic() + self._grace
                 os.kill(self._process.pid, signal.SIGINT)
             if late:
-                raise BadInput(f"it took more than {self._seconds:g} s, and was given up.")
+                raise BadInput(given_up)
             if not pipe.poll(OFTEN):
                 continue
             try:
@@ -99,6 +100,8 @@ class Bounded:
                 self._progress(*content)
             elif kind == "answer":
                 return str(content[0])
+            elif kind == "interrupted":
+                raise BadInput(given_up if overdue else "it was interrupted before there was a result.")
             else:
                 raise BadInput(content[0])
 
@@ -138,7 +141,7 @@ def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, .
     except MemoryError:
         send("error", f"it takes more than {MEMORY} MB of memory, and was given up.")
     except KeyboardInterrupt:
-        send("error", "it was interrupted before there was a result.")
+        send("interrupted")
     except Exception as error:
         traceback.print_exc()
         send("error", f"it stopped by a fault of the program ({type(error).__name__}); see what the server printed.")
