@@ -107,11 +107,18 @@ NO_LOGS = {
 }
 
 
-def test_whatever_is_brought_the_answer_is_a_sentence_and_the_bench_goes_on(recorded, tmp_path):
+WORST = ("random bytes", "a million columns", "a workbook that is a bomb", "a MATLAB file that is a bomb")
+
+
+@pytest.mark.parametrize(
+    "names", [WORST, pytest.param(tuple(NO_LOGS), marks=pytest.mark.thorough)], ids=["worst", "all"]
+)
+def test_whatever_is_brought_the_answer_is_a_sentence_and_the_bench_goes_on(recorded, tmp_path, names):
     # the page of this test reads nothing, while it waits for answers
     with Bench([recorded[1]], tmp_path) as bench, client(bench, max_queue=None) as page:
-        for name, made in NO_LOGS.items():
-            status, _, text = ask(bench, "api/rigs/furuta/logs?name=it.csv", page.me, data=made(), wait=LONG)
+        for name in names:
+            data = NO_LOGS[name]()
+            status, _, text = ask(bench, "api/rigs/furuta/logs?name=it.csv", page.me, data=data, wait=LONG)
             assert (status, text[:1].isupper() or text[:1] == "'", text[-1:]) == (400, True, "."), (name, text)
             assert "Traceback" not in text
             assert got(bench, "api/rigs")[0] == 200
