@@ -191,6 +191,7 @@ def test_first_motions_are_recorded_and_identified_by_mouse_and_a_fit_can_be_int
         assert one.wrong == []
 
 
+@pytest.mark.thorough  # it identifies twice
 def test_a_log_that_is_none_is_refused_and_a_stranger_s_is_identified(server, chromium, tmp_path):
     data = os.environ.get("UPRIGHT_REAL_DATA", "")
     log = Path(data) / "pendulum_cart_coulomb_aau/pend1test/test1pend1.csv"

@@ -135,7 +135,12 @@ def test_a_few_wrong_values_of_every_argument_get_an_answer_or_a_sentence(name, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "argument"), ARGUMENTS)
+@pytest.mark.parametrize(
+    ("name", "argument"),
+    [  # of the names of experiments some are those of experiments, which run
+        pytest.param(*each, marks=pytest.mark.thorough) if each == ("lab", "experiment") else each for each in ARGUMENTS
+    ],
+)
 def test_every_wrong_value_of_every_argument_gets_an_answer_or_a_sentence(name, argument, beside):
     for wrong in WRONG:
         meets(name, argument, wrong)
