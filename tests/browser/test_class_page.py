@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from tests.browser.students import DESK, PHONE, Server, Student, browser, student
+from tests.browser.students import DESK, PHONE, Server, Student, student
 
 pytestmark = pytest.mark.slow
 NAMES = ("Änne Müller", "Bob", "Cleo", "Đorđe")
@@ -20,12 +20,6 @@ def server(tmp_path_factory):
     opened = Server(folder, roster=roster)
     yield opened
     opened.close()
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as opened:
-        yield opened
 
 
 @contextmanager

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.browser.runs import record_first_motions, twin
-from tests.browser.students import DESK, Server, browser, student
+from tests.browser.students import DESK, Server, student
 from tests.browser.test_fits import ask
 from tests.browser.test_page import tab_to
 from tests.browser.test_served import client, got
@@ -133,12 +133,6 @@ def server(recorded, tmp_path_factory):
     opened = Server(folder)
     yield opened
     opened.close()
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as opened:
-        yield opened
 
 
 def identified(one, verdict):

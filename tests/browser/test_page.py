@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.students import DESK, PHONE, Server, browser, student
+from tests.browser.students import DESK, PHONE, Server, student
 from tests.browser.test_frames import decoded
 from upright.logs import read_log
 from upright.logs.replay import replay
@@ -41,12 +41,6 @@ def server(tmp_path_factory):
     opened = Server(tmp_path_factory.mktemp("bench"))
     yield opened
     opened.close()
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as opened:
-        yield opened
 
 
 MOVED = "wanted => Math.abs(document.querySelector('#pairs input').valueAsNumber - wanted) < 0.06"

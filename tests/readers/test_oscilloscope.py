@@ -67,3 +67,15 @@ def test_a_cell_that_is_no_number_is_named_by_its_line():
 def test_a_table_whose_first_column_is_called_x_is_no_screen():
     lines = [f"{t:.3f},{y:.4f}" for t, y in zip(T + 1, SWING, strict=True)]
     assert log(["x,theta", *lines]).provenance.reader == "table"
+
+
+def test_a_channel_without_a_unit_is_refused():
+    lines = [*SCREENS["Keysight"]]
+    lines[1] = "second,Volt"
+    with pytest.raises(BadInput, match="line 2: expected a unit for each channel, got 2 and 1"):
+        log(lines)
+
+
+def test_what_is_no_screen_is_refused_where_the_reader_is_named():
+    with pytest.raises(BadInput, match="expected the header of an oscilloscope's export"):
+        read_source(Source(file="log.csv", data=b"t,theta\n0,1\n1,2\n"), reader="oscilloscope")

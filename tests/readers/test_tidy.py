@@ -77,6 +77,13 @@ def test_a_row_with_a_cell_too_many_is_named_by_its_line():
         log("\n".join(lines))
 
 
+def test_a_time_that_comes_twice_is_named_by_its_line_in_the_file():
+    lines = plain().split("\n")
+    lines[7] = lines[5].split(",")[0] + lines[7][lines[7].index(",") :]
+    with pytest.raises(BadInput, match="line 8: the time of 'theta' must increase"):
+        log("\n".join(lines))
+
+
 def test_a_wide_table_with_a_column_of_words_is_none():
     """What else it holds in numbers would be lost."""
     rows = [f"{t:.3f},swing,{y},{u}" for t, y, u in zip(T, *SIGNALS.values(), strict=True)]

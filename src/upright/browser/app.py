@@ -18,6 +18,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
+from upright.browser.answers import nothing, report_page, sentence_of
 from upright.browser.classroom.overview import Overview
 from upright.browser.classroom.room import Classroom
 from upright.browser.guard import INSTRUCTOR
@@ -76,7 +77,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
     async def asset(request: Request) -> Response:
         package, name, kind = SHARED.get(request.path_params["name"], ("", "", ""))
         content = _content(package, name) if package else None
-        return _nothing() if content is None else Response(content, media_type=kind)
+        return nothing() if content is None else Response(content, media_type=kind)
 
     async def rigs(request: Request) -> Response:
         known = [
@@ -93,7 +94,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
     async def script(request: Request) -> Response:
         name = request.path_params["name"]
         if name not in hubs:
-            return _nothing()
+            return nothing()
         rig = hubs[name].station.rig  # a class knows one rig, by one law
         if rig.law_path not in scripts:
             scripts[rig.law_path] = asyncio.create_task(asyncio.to_thread(in_own_process, twin_script, rig))
@@ -108,11 +109,11 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
 
     async def runs(request: Request) -> Response:
         hub = hubs.get(request.path_params["name"])
-        return _nothing() if hub is None else JSONResponse(listed(hub.station.folder, hub.station.rig.name))
+        return nothing() if hub is None else JSONResponse(listed(hub.station.folder, hub.station.rig.name))
 
     async def result(request: Request) -> Response:
         hub = hubs.get(request.path_params["name"])
-        return _nothing() if hub is None else _result(hub.station.folder, hub.station.rig.name, request.url.path)
+        return nothing() if hub is None else _result(hub.station.folder, hub.station.rig.name, request.url.path)
 
     async def live(socket: WebSocket) -> None:
         hub = hubs.get(socket.path_params["name"])
@@ -247,8 +248,7 @@ async def _first(*doing: Any) -> None:
 
 
 def _error(error: UprightError) -> str:
-    text = str(error)
-    return json.dumps({"type": "error", "sentence": text[:1].upper() + text[1:]})
+    return json.dumps({"type": "error", "sentence": sentence_of(error)})
 
 
 def _content(package: str, name: str) -> bytes | None:
@@ -261,11 +261,6 @@ def _result(folder: Path, name: str, path: str) -> Response:
     for run in listed(folder, name):
         if run.get("log") == path:
             return FileResponse(folder / f"{run['id']}.mcap", filename=f"{name}-{run['id']}.mcap")
-        if run.get("report") == path:  # a report has a policy of its own
-            headers = {"content-security-policy": "frame-ancestors 'self'"}
-            return FileResponse(folder / f"{run['id']}.html", media_type="text/html", headers=headers)
-    return _nothing()
-
-
-def _nothing() -> Response:
-    return PlainTextResponse("There is nothing here.", status_code=404)
+        if run.get("report") == path:
+            return report_page(folder / f"{run['id']}.html")
+    return nothing()

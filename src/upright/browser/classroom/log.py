@@ -22,6 +22,11 @@ def rows_of(log: Path) -> Path:
     return log.with_suffix(".rows")
 
 
+def row_of(coordinates: int) -> np.dtype[np.void]:
+    """A row there."""
+    return np.dtype([("tick", "<i8"), ("counts", "<i8", (coordinates,)), ("command", "<f8"), ("reference", "<f8")])
+
+
 def write_lane_report(
     run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law, without: bool = False
 ) -> str:
@@ -47,10 +52,7 @@ def _write_log(run: PreparedRun, end: RunEnd, started: float, units: tuple[str, 
     assert end.about is not None  # as was just asked
     header = log_header(run.order, end.about, units, law, started)
     n, followed = len(units), bool(run.order.references)
-    kept = np.fromfile(
-        rows_of(run.order.log),
-        dtype=[("tick", "<i8"), ("counts", "<i8", (n,)), ("command", "<f8"), ("reference", "<f8")],
-    )
+    kept = np.fromfile(rows_of(run.order.log), dtype=row_of(n))
     events = list(end.events)
     with open(run.order.log, "wb") as stream:
         file = RunFile(stream, header)

@@ -17,7 +17,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.browser.classroom.log import rows_of, write_lane_report
+from upright.browser.classroom.log import row_of, rows_of, write_lane_report
 from upright.browser.classroom.memory import (
     BY_HAND,
     CLOSE,
@@ -406,9 +406,7 @@ class Classroom:
 
     def _keep_rows(self, run: _LaneRun, rows: NDArray[np.void], first: int) -> None:
         n = len(self._units)
-        kept = np.zeros(
-            len(rows), dtype=[("tick", "<i8"), ("counts", "<i8", (n,)), ("command", "<f8"), ("reference", "<f8")]
-        )
+        kept = np.zeros(len(rows), dtype=row_of(n))
         kept["tick"], kept["counts"], kept["command"] = rows["number"], rows["counts"][:, :n], rows["command"]
         kept["reference"] = self._shared.numbers("reference")[(first + rows["number"]) % ROWS, run.desk.lane]
         with suppress(OSError):  # a full disk ends no run; its log is found to be short

@@ -11,6 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from upright.browser.answers import sentence_of
 from upright.browser.identify.bounded import Bounded
 from upright.browser.identify.tasks import begin_identification, begin_inspection
 from upright.browser.rig import BenchRig
@@ -173,13 +174,13 @@ class Identifications:
             kept = {**{n: now[n] for n in ("id", "log", "of", "name", "since")}, "verdict": verdict}
             replace_file(self._folder / "fits" / now["id"] / f"{now['id']}.json", json.dumps(kept).encode())
         except UprightError as error:
-            failed = str(error)
+            failed = sentence_of(error)
         except BaseException:
-            failed = "it failed by a fault of the program; see what the server printed."
+            failed = "It failed by a fault of the program; see what the server printed."
             raise
         finally:
             with self._lock:
-                self._now, self._job, self._failed = None, None, failed[:1].upper() + failed[1:]
+                self._now, self._job, self._failed = None, None, failed
 
 
 def shown_name(name: str) -> str:

@@ -12,6 +12,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
+from upright.browser.answers import nothing, report_page, sentence_of
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Identifications
 from upright.browser.messages import LONGEST
@@ -22,8 +23,7 @@ WHO = "x-bench-me"
 SLOWEST = 120.0
 """Time for a log to come [s]."""
 _TEXT = 100
-FILES = {"html": ("report.html", "text/html"), "json": ("facts.json", "application/json"),
-         "fit": ("fit.json", "application/json")}  # fmt: skip
+FILES = {"html": "report.html", "json": "facts.json", "fit": "fit.json"}
 """By the ending of an address."""
 
 Answering = Callable[[Request], Awaitable[Response]]
@@ -34,33 +34,31 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list
 
     async def described(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
-        return _nothing() if own is None else JSONResponse(await asyncio.to_thread(own.described))
+        return nothing() if own is None else JSONResponse(await asyncio.to_thread(own.described))
 
     async def written(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
         key, _, end = request.path_params["file"].rpartition(".")
-        if own is None or end not in FILES or (path := own.file(key, FILES[end][0])) is None:
-            return _nothing()
-        if end == "html":  # a report has a policy of its own
-            headers = {"content-security-policy": "frame-ancestors 'self'"}
-            return FileResponse(path, media_type=FILES[end][1], headers=headers)
+        if own is None or end not in FILES or (path := own.file(key, FILES[end])) is None:
+            return nothing()
+        if end == "html":
+            return report_page(path)
         name = f"{request.path_params['name']}-{key}.json" if end == "fit" else None
-        return FileResponse(path, media_type=FILES[end][1], filename=name)
+        return FileResponse(path, media_type="application/json", filename=name)
 
     def for_operator(answer: Callable[[Request, Identifications], Awaitable[Response]]) -> Answering:
         async def checked(request: Request) -> Response:
             name = request.path_params["name"]
             if name not in hubs:
-                return _nothing()
+                return nothing()
             try:
                 _operates(hubs[name], request.headers.get(WHO, ""))
                 return await answer(request, fits[name])
             except UprightError as error:
                 await _rest(request)
-                text = str(error)
-                return PlainTextResponse(text[:1].upper() + text[1:], status_code=400)
+                return PlainTextResponse(sentence_of(error), status_code=400)
             except ClientDisconnect:
-                return _nothing()
+                return nothing()
 
         return checked
 
@@ -141,7 +139,3 @@ async def _body(request: Request, most: int, what: str) -> bytes:
     except TimeoutError:
         raise BadInput(f"it did not come within {SLOWEST:g} s.") from None
     return bytes(data)
-
-
-def _nothing() -> Response:
-    return PlainTextResponse("There is nothing here.", status_code=404)

@@ -222,10 +222,6 @@ def regress(rig: GreyBox, samples: list[Sample], *, tolerance: float = 1e-5) -> 
 
 PLAINLY = 0.9
 """Share of the squares that another start must leave at most to be followed."""
-
-
-FRICTION = ("N", "N m", "N s/m", "N m s/rad")
-"""Units of its terms."""
 BESIDE = 30.0
 """Factor by which a guess may be larger or smaller than what the motion asks for."""
 
@@ -239,15 +235,17 @@ def _proportionate(rig: GreyBox, sample: Sample) -> dict[str, float]:
     held = {p.unit: p.value for p in rig.parameters.values() if not p.estimate and p.value > 0}
     w, a = 2 * math.pi / sample.period, float(np.sqrt(np.mean(sample.measured[0] ** 2)))
     u = float(np.sqrt(np.mean(sample.u**2)))
-    sizes: dict[str, float] = {}
+    sizes, friction = dict[str, float](), dict[str, float]()
     for inertia, force, spring, damping in (
         ("kg", "N", "N/m", "N s/m"), ("kg m^2", "N m", "N m/rad", "N m s/rad"),
     ):  # fmt: skip
         if m := held.get(inertia):
-            sizes |= {inertia: m, spring: m * w**2, damping: 0.1 * m * w, force: 0.1 * m * a}
+            sizes |= {inertia: m, spring: m * w**2}
             sizes |= {f"{of}/{unit}": m * a / u for of in (force, f"({force})") for unit in ("V", "A") if u}
+            friction |= {damping: 0.1 * m * w, force: 0.1 * m * a}
+    sizes |= friction
     sought = {p.name: p for p in rig.parameters.values() if p.estimate and p.unit in sizes}
-    firm = [p for p in sought.values() if p.unit not in FRICTION]  # which may be as small as it likes
+    firm = [p for p in sought.values() if p.unit not in friction]  # which may be as small as it likes
     if all(sizes[p.unit] / BESIDE < abs(p.value) < sizes[p.unit] * BESIDE for p in firm):
         return {}
     return {name: math.copysign(sizes[p.unit], p.value or 1.0) for name, p in sought.items()}

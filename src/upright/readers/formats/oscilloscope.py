@@ -42,9 +42,13 @@ class _Screen:
 def read(source: Source) -> Record:
     """Record of one screen; its time runs from before the trigger, which is at 0."""
     head, lines = source.text[:_HEAD], source.text.rstrip().split("\n")
-    screen = (
-        _beside(lines) if _BESIDE.match(head) else _counted(source, lines) if _SEQUENCE.match(head) else _above(lines)
-    )
+    layout = _beside if _BESIDE.match(head) else _counted if _SEQUENCE.match(head) else _above
+    screen = layout(source, lines)
+    if len(screen.names) != len(screen.units):
+        raise source.bad(
+            f"expected a unit for each channel, got {len(screen.names)} and {len(screen.units)}; export it again",
+            line=max(screen.first_line - 1, 1),
+        )
     table = TextTable(
         source=source, text="\n".join(screen.rows), names=("time", *screen.names), delimiter=",",
         first_line=screen.first_line,
@@ -58,7 +62,7 @@ def read(source: Source) -> Record:
     )  # fmt: skip
 
 
-def _beside(lines: Sequence[str]) -> _Screen:
+def _beside(_: Source, lines: Sequence[str]) -> _Screen:
     cells = [line.split(",") for line in lines]
     header = {row[0].strip(): row[1].strip() for row in cells if row[0].strip()}
     return _Screen(
@@ -81,8 +85,10 @@ def _counted(source: Source, lines: Sequence[str]) -> _Screen:
     )  # fmt: skip
 
 
-def _above(lines: Sequence[str]) -> _Screen:
-    at = next(i for i, line in enumerate(lines) if line.lower().startswith("second,"))
+def _above(source: Source, lines: Sequence[str]) -> _Screen:
+    at = next((i for i, line in enumerate(lines) if i and line.lower().startswith("second,")), 0)
+    if not at:
+        raise source.bad("expected the header of an oscilloscope's export, got none; leave out the reader")
     names, units = ([cell.strip() for cell in line.split(",")][1:] for line in lines[at - 1 : at + 1])
     named = [f"CH{name}" if name.isdecimal() else name for name in names]
     return _Screen(names=named, units=units, rows=list(lines[at + 1 :]), first_line=at + 2)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from upright.errors import BadInput
-from upright.readers.formats.delimited import tabulated
+from upright.readers.formats.delimited import begins_with_number, tabulated
 from upright.readers.reader import Reader
 from upright.readers.source import Source, cell
 from upright.readers.stamps import in_seconds
@@ -24,6 +24,8 @@ _HEAD = 1 << 14  # characters by which such a table is known
 _FIELDS = re.compile(r"_?(field|name|signal|variable|channel|sensor|topic|metric|key|tag|parameter|measurement)", re.I)
 _VALUES = re.compile(r"_?(value|reading|val|wert|data)", re.I)
 _TIMES = re.compile(r"_?(time|timestamp|date|datetime|ts)", re.I)
+_LOOKED = 400
+"""Rows that show what each column is."""
 _MOST = 64
 """Signals."""
 
@@ -31,11 +33,11 @@ _MOST = 64
 def read(source: Source) -> Record:
     """Record of all signals."""
     header, rows, first_line = _rows(source, source.text)
-    at = _columns(header, rows)
+    at = _columns(header, rows[:_LOOKED])
     if at is None:
         raise source.bad("expected columns of times, names of signals and values", line=max(first_line - 1, 1))
     when, which, what = at
-    times: dict[str, list[str]] = {}
+    times, lines = dict[str, list[str]](), dict[str, list[int]]()
     values: dict[str, list[float]] = {}
     for line, row in enumerate(rows, start=first_line):
         if not row:
@@ -44,16 +46,19 @@ def read(source: Source) -> Record:
             raise source.bad(f"expected {len(header)} cells, got {len(row)}; mend or delete the row", line=line)
         name = row[which].strip()
         times.setdefault(name, []).append(row[when].strip())
+        lines.setdefault(name, []).append(line)
         values.setdefault(name, []).append(cell(source, row[what], line=line, column=what + 1, name=name))
         if len(times) > _MOST:
             raise source.bad(f"expected at most {_MOST} signals, got more in '{header[which]}'", line=line)
     base = max(times, key=lambda name: len(times[name]))
     others = [name for name in times if times[name] != times[base]]
     columns = {name: np.array(y, dtype=np.float64) for name, y in values.items()}
-    if others:
-        clocks = _clocks(source, times, header[when])
-        for name in others:
-            columns[name] = _held(source, name, clocks[name], columns[name], clocks[base])
+    clocks = _clocks(source, times, header[when])
+    for name in (base, *others):
+        source.must_increase(clocks[name], lambda row, of=name: {"line": lines[of][row]}, what=f"the time of '{name}'")
+    for name in others:
+        last = np.searchsorted(clocks[name], clocks[base], side="right") - 1
+        columns[name] = columns[name][np.maximum(last, 0)]
     record = tabulated(source, _wide(header[when], times[base], columns))
     held = [f"Held from value to value, the first before it: {', '.join(others)}."] if others else []
     return record.replace(provenance=source.provenance("tidy", *record.provenance.notes, *held))
@@ -76,8 +81,8 @@ def _columns(header: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[int,
     whole = [row for row in rows if len(row) == len(header)]
     if len(header) < 3 or len(whole) < 4:
         return None
-    numbers = [j for j in range(len(header)) if sum(_is_number(row[j]) for row in whole) > len(whole) / 2]
-    texts = [j for j in range(len(header)) if not any(_is_number(row[j]) or _is_stamp(row[j]) for row in whole)]
+    numbers = [j for j in range(len(header)) if sum(begins_with_number(row[j]) for row in whole) > len(whole) / 2]
+    texts = [j for j in range(len(header)) if not any(begins_with_number(row[j]) or _is_stamp(row[j]) for row in whole)]
     called = [j for j in texts if _FIELDS.fullmatch(header[j])]
     which = next((j for j in called if "measurement" not in header[j].lower()), called[0] if called else None)
     when = next((j for j, name in enumerate(header) if _TIMES.fullmatch(name) or time_scale(name)), None)
@@ -86,14 +91,6 @@ def _columns(header: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[int,
         return None
     beside = {header[j] for j in numbers} - {header[when], header[what], "table"}  # of InfluxDB, numbers each signal
     return None if beside else (when, which, what)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _is_stamp(text: str) -> bool:
@@ -109,12 +106,6 @@ def _clocks(source: Source, times: dict[str, list[str]], name: str) -> dict[str,
         raise source.bad(f"expected times of one form in '{name}', got different ones") from None
     ends = np.cumsum([len(each) for each in times.values()])[:-1]
     return dict(zip(times, np.split(every, ends), strict=True))
-
-
-def _held(source: Source, name: str, t: Array, y: Array, onto: Array) -> Array:
-    if (np.diff(t) < 0).any():
-        raise source.bad(f"the times of '{name}' must increase; export each run on its own")
-    return y[np.maximum(np.searchsorted(t, onto, side="right") - 1, 0)]
 
 
 def _wide(clock: str, times: Sequence[str], columns: dict[str, Array]) -> str:

@@ -116,15 +116,8 @@ def bench(
         raise BadInput(
             f"the bench needs the bench extra ({error.name} is not installed): pip install 'upright[bench]'."
         ) from None
-    opened = open_bench(
-        rig_files,
-        laws,
-        kept,
-        port=port,
-        lan=lan,
-        fifo=fifo,
-        **({} if roster is None else {"roster": path_of(roster, "the list of a class")}),
-    )
+    names = None if roster is None else path_of(roster, "the list of a class")
+    opened = open_bench(rig_files, laws, kept, port=port, lan=lan, roster=names, fifo=fifo)
     if browser:
         import webbrowser
 
