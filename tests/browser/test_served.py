@@ -54,7 +54,10 @@ def got(bench, path, wait=SOON, **how):
         with urllib.request.urlopen(asked, timeout=wait) as answer:
             return answer.status, answer.headers, answer.read().decode()
     except urllib.error.HTTPError as refused:
-        return refused.code, refused.headers, refused.read().decode()
+        text = b""
+        with suppress(ConnectionError):  # who is sent away by the guard while sending may lose the sentence
+            text = refused.read()
+        return refused.code, refused.headers, text.decode()
 
 
 class Client:
