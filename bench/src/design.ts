@@ -3,15 +3,18 @@
 import { Answers } from "./answers";
 import { lock, message } from "./bar";
 import { byId, field, make, say } from "./dom";
-import { Plane } from "./plane";
+import { Plane, spoken } from "./plane";
 import { type Group, LEAST, MOST_RATIO, characteristic, grouped, noise, polesOf, roots, within } from "./poles";
+import { Regulator, branches, prices } from "./regulator";
 import type { Session } from "./session";
 import { about, drawStrip, limited } from "./strip";
-import { short, shownUnit, signed, significant, symbol } from "./words";
+import { DEGREE, short, shownUnit, signed, significant, symbol } from "./words";
 
 const ORDER: Fate[] = ["stands", "saturates", "falls"];
 const NAME: Record<Fate, string> = { stands: "stabilised", saturates: "stabilised with saturation", falls: "lost" };
 const ENOUGH = 0.95, AHEAD = 2; // share of rigs; seconds of the prediction
+const COSTLY: Record<string, [driven: number, other: number]> = { rad: [30 / DEGREE, 15 / DEGREE], m: [0.1, 0.05] }; // at which deviation, at a price of 1, a coordinate costs what a full command does
+const SAME = 1e-6; // of two sets of poles [1/s]
 const WIDE = 14, TALL = 17; // of a small pendulum
 
 const svg = (tag: string, attributes: Record<string, string | number>, parent?: Element) => RigDrawing.make(tag, attributes, parent);
@@ -36,10 +39,16 @@ export class Design {
   private confirming = false;
   private predicted: Float64Array[] = [];
   private fates: Fate[] = [];
+  private regulator!: Regulator;
+  /** Of the command where the poles are the regulator's; undefined where they were set by hand. */
+  private price: number | undefined;
+  private readonly costly = DATA.coordinates.map(({ unit }, i) => (COSTLY[unit] ?? [1, 1])[i === DATA.moved ? 0 : 1]);
 
   constructor(private readonly session: Session) {
     this.answers = new Answers(session.name, (fates, ms) => this.answered(fates, ms));
     this.sliders();
+    this.weights();
+    byId<HTMLInputElement>("lqr-slider").addEventListener("input", ({ target }) => this.slide(10 ** -(target as HTMLInputElement).valueAsNumber));
     for (const fate of ORDER) {
       const picture = svg("svg", { viewBox: "-7 -8 14 16", "aria-hidden": "true" });
       stick(fate, 0, 0, picture);
@@ -58,11 +67,69 @@ export class Design {
     const { poles } = this.session.scene!, now = JSON.stringify(poles);
     if (now === this.applied) return;
     this.applied = now;
-    this.groups = grouped(poles);
+    const before = this.poles(), same = before.length === poles.length && poles.every(([re, im]) => before.some(([a, b]) => Math.hypot(re - a, im - b) < SAME * (1 + Math.hypot(a, b))));
+    if (!same) {
+      this.groups = grouped(poles);
+      this.price = undefined;
+    }
     const fastest = 5 * Math.ceil((1.6 * Math.max(...poles.map(([re, im]) => Math.hypot(re, im)), 6)) / 5);
     this.table(fastest);
-    this.plane = new Plane(byId<SVGSVGElement>("plane"), this.groups, roots(characteristic(DATA.A)), fastest, () => this.moved());
+    this.plane = new Plane(byId<SVGSVGElement>("plane"), this.groups, roots(characteristic(DATA.A)), fastest, () => this.byHand());
+    this.locus();
     this.moved();
+  }
+
+  /** The regulator for what the states cost, and where its poles may go. */
+  private locus(): void {
+    const { A, B, command } = DATA, plane = this.plane!;
+    this.regulator = new Regulator({ A, B, limit: command.limit, deviations: this.costly.flatMap((most) => [most, Infinity]) });
+    const offered = prices(this.regulator, Math.min(plane.fastest, 1 / DATA.period), plane.highest), slider = byId<HTMLInputElement>("lqr-slider");
+    plane.track(branches(this.regulator, offered));
+    const at = offered.map((price) => -Math.log10(price));
+    slider.disabled = !at.length;
+    slider.min = `${(at[0] ?? 0).toFixed(1)}`;
+    slider.max = `${(at.at(-1) ?? 0).toFixed(1)}`;
+    slider.step = "0.05";
+    const size = (poles: Complex[]) => Math.max(...poles.map(([re, im]) => Math.hypot(re, im))), now = size(this.poles());
+    const off = (price: number) => Math.abs(size(this.regulator.poles(price)) - now);
+    const price = this.price ?? offered.reduce((best, each) => (off(each) < off(best) ? each : best), offered[0] ?? 1);
+    slider.value = `${-Math.log10(price)}`;
+  }
+
+  private slide(price: number): void {
+    this.price = price;
+    this.groups.splice(0, Infinity, ...this.regulator.groups(price)); // the plane has the same list
+    this.moved();
+  }
+
+  private byHand(): void {
+    this.price = undefined;
+    this.moved();
+  }
+
+  /** Fields of what the states cost, and why the poles lie where they do. */
+  private weights(): void {
+    const { coordinates } = DATA;
+    byId("lqr-weights").replaceChildren(...coordinates.map(({ name, unit }, i) => {
+      const shown = shownUnit(unit);
+      return field(`${symbol(name)} costs 1 at`, shown.unit, Number((this.costly[i]! * shown.scale).toPrecision(6)), [0.1, 1000, 0.1], (value) => {
+        this.costly[i] = value / shown.scale;
+        this.locus();
+        if (this.price) this.slide(this.price);
+        else this.moved();
+      }).row;
+    }));
+    say(byId("lqr-why"), "The poles are the stable roots of a(s) a(−s) + Σ (u_max / x_max)² b(s) b(−s) / ρ = 0, with a(s) of the model and b(s) from the command to each state that costs. A dear command leaves stable poles where they are and mirrors the unstable one; a cheap one is fast.");
+    say(byId("lqr-source"), "Kalman 1964, “When is a linear control system optimal?”; what a state costs: Bryson and Ho 1975. The linear model knows no delay, dry friction or limit; what those change, the rigs beside it show.");
+  }
+
+  private cost(): void {
+    const { coordinates, command } = DATA, { price } = this, slider = byId("lqr-slider");
+    const terms = coordinates.map(({ name, unit }, i) => `(${symbol(name)} / ${significant(this.costly[i]! * shownUnit(unit).scale)} ${shownUnit(unit).unit})²`);
+    say(byId("lqr-cost"), `u = −K x with the least ∫ ${terms.join(" + ")} + ρ (u / ${significant(command.limit)} ${command.unit})² dt; speeds cost nothing.`);
+    const words = price === undefined ? "the poles were set by hand" : `ρ = ${significant(price, 2)}`;
+    say(byId("lqr-price"), words);
+    slider.setAttribute("aria-valuetext", price === undefined ? words : `price of the command ${significant(price, 2)}, ${this.groups.map(spoken).join("; ")}`);
   }
 
   private table(fastest: number): void {
@@ -71,7 +138,7 @@ export class Design {
     byId("pairs").replaceChildren(...this.groups.map((group, k) => {
       const change = (part: Partial<Group>) => {
         this.groups[k] = within({ ...this.groups[k]!, ...part }, fastest);
-        this.moved();
+        this.byHand();
       };
       const name = group.single ? "real pole" : `pair ${k + 1}`;
       const frequency = field("", "", group.frequency, [LEAST.frequency, fastest, 0.1], (value) => change({ frequency: value })).input;
@@ -106,6 +173,7 @@ export class Design {
 
   private moved(): void {
     this.confirm(false);
+    this.cost();
     this.plane?.show(this.groups);
     this.groups.forEach((group, k) => {
       const [frequency, ratio] = this.rows[k]!, poles = polesOf(group);

@@ -4,6 +4,7 @@ import { type Group, dragged, polesOf, within } from "./poles";
 import { signed } from "./words";
 
 const draw = (tag: string, attributes: Record<string, string | number>, parent: Element) => RigDrawing.make(tag, attributes, parent);
+const WIDE = 1.15, HIGH = 1.2; // of the plane, in lengths of its fastest pole, where either just fits
 const NEAR = 10; // px from the real axis within which a pair is real
 
 export const spoken = ({ single, frequency, ratio }: Group): string =>
@@ -14,6 +15,8 @@ export const spoken = ({ single, frequency, ratio }: Group): string =>
 export class Plane {
   private readonly marks: { heads: SVGElement[]; name: SVGElement }[] = [];
   private readonly behind: SVGElement;
+  private readonly line: SVGElement;
+  private locus: Complex[][] = [];
   private scale = 1;
   private origin: [number, number] = [0, 0];
 
@@ -24,9 +27,15 @@ export class Plane {
   ) {
     svg.replaceChildren();
     this.behind = draw("g", {}, svg);
+    this.line = draw("path", { class: "locus" }, svg);
     groups.forEach((_, k) => this.marks.push(this.mark(k)));
     new ResizeObserver(() => this.resize()).observe(svg);
     this.resize();
+  }
+
+  /** How far from the real axis a pole is certain to be seen [1/s]. */
+  get highest(): number {
+    return 0.46 * HIGH * this.fastest;
   }
 
   show(groups: Group[]): void {
@@ -40,6 +49,13 @@ export class Plane {
       handle.setAttribute("aria-valuenow", group.frequency.toFixed(2));
       handle.setAttribute("aria-valuetext", spoken(group));
     });
+  }
+
+  /** Draws branches behind the poles. */
+  track(locus: Complex[][]): void {
+    this.locus = locus;
+    const place = ([re, im]: Complex) => `${this.origin[0] + re * this.scale} ${this.origin[1] - im * this.scale}`;
+    this.line.setAttribute("d", locus.map((branch) => `M${branch.map(place).join("L")}`).join(""));
   }
 
   private move([re, im]: Complex): string {
@@ -95,10 +111,11 @@ export class Plane {
   private resize(): void {
     const width = this.svg.clientWidth, height = this.svg.clientHeight;
     if (!width || !height) return;
-    this.scale = Math.min(width / (1.15 * this.fastest), height / (1.2 * this.fastest));
+    this.scale = Math.min(width / (WIDE * this.fastest), height / (HIGH * this.fastest));
     this.origin = [width - 0.12 * this.fastest * this.scale, height / 2];
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.grid(width, height);
+    this.track(this.locus);
     this.show(this.groups);
   }
 

@@ -11,6 +11,8 @@ export const LEAST = { frequency: 0.5, ratio: 0.05 };
 export const MOST_RATIO = 3;
 // Two equal poles are as ill conditioned to place as they are to draw.
 const APART = 1e-3;
+// Relative step of a root below which it is found; with a root that is double it is never reached.
+const SETTLED = 1e-15;
 
 export function grouped(poles: Complex[]): Group[] {
   const pairs = poles.filter(([, im]) => im > 0).map(([re, im]) => pair(Math.hypot(re, im), -re / Math.hypot(re, im)));
@@ -37,11 +39,16 @@ export function polesOf(group: Group): Complex[] {
   return [[-z * w + apart, 0], [-z * w - apart, 0]];
 }
 
+/** The nearest group whose two poles are apart. */
+export function clear(group: Group): Group {
+  const near = !group.single && Math.abs(group.ratio - 1) < APART;
+  return near ? { ...group, ratio: group.ratio < 1 ? 1 - APART : 1 + APART } : group;
+}
+
 /** The nearest group that may be asked for: no pole is further from the origin than the fastest. */
 export function within(group: Group, fastest: number): Group {
   const between = (x: number, low: number, high: number) => Math.min(Math.max(x, low), high);
-  let ratio = between(group.ratio, LEAST.ratio, MOST_RATIO);
-  if (Math.abs(ratio - 1) < APART) ratio = ratio < 1 ? 1 - APART : 1 + APART;
+  const { ratio } = clear({ ...group, ratio: between(group.ratio, LEAST.ratio, MOST_RATIO) });
   const spread = ratio > 1 && !group.single ? ratio + Math.sqrt(ratio * ratio - 1) : 1;
   return { ...group, ratio, frequency: between(group.frequency, LEAST.frequency, fastest / spread) };
 }
@@ -55,17 +62,21 @@ export function dragged(group: Group, which: number, [re, im]: Complex, near: nu
   return ofReal(-left, -other);
 }
 
-/** Coefficients of the characteristic polynomial, highest power first (Faddeev and LeVerrier). */
-export function characteristic(A: number[][]): number[] {
-  const n = A.length, p = [1];
+/** (s I - A)^-1 = sum M_k s^(n - k) / p(s), k from 1, p highest power first (Faddeev and LeVerrier). */
+export function resolvent(A: number[][]): { p: number[]; M: number[][][] } {
+  const n = A.length, p = [1], all: number[][][] = [];
   let M = A.map((row) => row.map(() => 0));
   for (let k = 1; k <= n; k++) {
     M = M.map((row, i) => row.map((v, j) => v + (i === j ? p[k - 1]! : 0)));
+    all.push(M);
     M = A.map((row) => M[0]!.map((_, j) => row.reduce((sum, a, i) => sum + a * M[i]![j]!, 0)));
     p.push(-M.reduce((sum, row, i) => sum + row[i]!, 0) / k);
   }
-  return p;
+  return { p, M: all };
 }
+
+/** Coefficients of the characteristic polynomial, highest power first. */
+export const characteristic = (A: number[][]): number[] => resolvent(A).p;
 
 /** Roots of a polynomial with leading coefficient 1 (Durand and Kerner). */
 export function roots(p: number[]): Complex[] {
@@ -76,13 +87,17 @@ export function roots(p: number[]): Complex[] {
     const angle = (2 * Math.PI * (i + 0.25)) / n;
     return [radius ** (1 / 2) * Math.cos(angle), radius ** (1 / 2) * Math.sin(angle)];
   });
-  for (let step = 0; step < 200; step++)
+  for (let step = 0, moved = 1; step < 200 && moved > SETTLED; step++) {
+    moved = 0;
     all.forEach((z, i) => {
       const value = p.reduce<Complex>((sum, c) => { const [a, b] = times(sum, z); return [a + c, b]; }, [0, 0]);
       const apart = all.reduce<Complex>((product, w, j) => (j === i ? product : times(product, [z[0] - w[0], z[1] - w[1]])), [1, 0]);
       const [a, b] = over(value, apart);
-      if (Number.isFinite(a + b)) all[i] = [z[0] - a, z[1] - b];
+      if (!Number.isFinite(a + b)) return;
+      all[i] = [z[0] - a, z[1] - b];
+      moved = Math.max(moved, Math.hypot(a, b) / (Math.hypot(...all[i]!) || 1));
     });
+  }
   return all;
 }
 

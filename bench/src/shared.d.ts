@@ -15,6 +15,7 @@ interface TwinData {
   coordinates: { name: string; unit: string; meaning: string }[];
   command: { unit: string; limit: number };
   point: number[];
+  moved: number;
   period: number;
   resolution: number[];
   delay: number;

@@ -7,7 +7,9 @@ import re
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_are
 
 from tests.browser.students import DESK, PHONE, Server, student
 from tests.browser.test_frames import decoded
@@ -85,6 +87,39 @@ def test_a_whole_session_by_keyboard_alone(server, chromium):
         one.sees("stopped")
         one.reads("#latch", "Stopped by its operator")
         tab_to(page, "#stop")
+        one.leaves()
+        assert one.wrong == []
+
+
+def test_by_keyboard_the_lqr_slider_gives_the_gains_of_riccati_s_equation_and_they_are_applied(server, chromium):
+    """By scipy, for the deviations and the price that the page shows."""
+    with student(chromium, server, screen="design") as one:
+        page = one.page
+        one.starts()
+        one.reads("#lqr-price", "set by hand")
+        tab_to(page, "#lqr-slider")
+        for key in ("Home", "PageUp", "PageUp", "PageUp", "ArrowRight"):
+            page.keyboard.press(key)
+        slider = page.locator("#lqr-slider")
+        price = 10 ** -float(slider.input_value())
+        one.reads("#lqr-price", "ρ = [1-9]")
+        assert "damping ratio" in slider.get_attribute("aria-valuetext")
+        tab_to(page, "#lqr summary")
+        page.keyboard.press("Enter")
+        weighed = [math.radians(float(field.input_value())) for field in page.locator("#lqr-weights input").all()]
+        linear = RIG.linear("inverted")
+        Q = np.diag([1 / weighed[0] ** 2, 0, 1 / weighed[1] ** 2, 0])
+        S = solve_continuous_are(linear.A, linear.B, Q, [[price / RIG.limit**2]])
+        K = RIG.limit**2 / price * (linear.B.T @ S)[0]
+        shown = " ".join(page.locator("#before tr:has-text('gains on') td").all_inner_texts())
+        gains = [float(text) for text in re.findall(r"-?[\d.]+", shown.replace("\u2212", "-"))]
+        assert gains == pytest.approx(K.tolist(), rel=6e-3)  # three digits are shown
+        tab_to(page, "#apply")
+        page.keyboard.press("Enter")
+        one.reads("#message", r"act from tick \d+")
+        one.reads("#lqr-price", "ρ = [1-9]")  # what acts is still the regulator's
+        page.locator("#pairs input").first.press("ArrowUp")
+        one.reads("#lqr-price", "set by hand")
         one.leaves()
         assert one.wrong == []
 
