@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 from pathlib import Path
 
@@ -79,6 +80,18 @@ def run() -> bytes:
     return written(60, every=20, finish=False)
 
 
+def parquet(n: int = 60) -> bytes:
+    import pandas as pd
+
+    file = io.BytesIO()
+    pd.DataFrame({"t": 0.01 * np.arange(n), "theta": np.sin(np.arange(n))}).to_parquet(file)
+    return file.getvalue()
+
+
+def objects(n: int = 60) -> bytes:
+    return json.dumps({"log": [{"t": 0.01 * i, "theta": float(np.sin(i))} for i in range(n)]}).encode()
+
+
 SYNTHETIC = {
     "ecp.csv": ecp_export,
     "front end.txt": tab_export,
@@ -88,4 +101,6 @@ SYNTHETIC = {
     "bag.csv": ros_bag,
     "plain.mat": mat_vectors,
     "run.mcap": run,
+    "frame.parquet": parquet,
+    "objects.json": objects,
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -181,6 +181,15 @@ def tabulated(source: Source, given: str | None = None) -> Record:
         units={name: stated_unit(name) for name in signals},
         provenance=source.provenance("table", *filter(None, [note, *notes])),
     )
+
+
+def of_columns(source: Source, columns: Mapping[str, Sequence[str]]) -> Record:
+    """The record that `read` makes of columns whose cells are given as text; a column of stamps may be anywhere."""
+    stamped = next((name for name, cells in columns.items() if cells and in_seconds(cells[0])[1]), None)
+    names = sorted(columns, key=lambda name: name != stamped)
+    head = ",".join(f'"{name}"' if "," in name else name for name in names)
+    rows = map(",".join, zip(*(columns[name] for name in names), strict=True))
+    return tabulated(source, "\n".join([head, *rows]) + "\n")
 
 
 def read_written(source: Source) -> Record:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from upright.errors import BadInput
-from upright.readers.formats.delimited import begins_with_number, tabulated
+from upright.readers.formats.delimited import begins_with_number, of_columns
 from upright.readers.reader import Reader
 from upright.readers.source import Source, cell
 from upright.readers.stamps import in_seconds
@@ -59,7 +59,9 @@ def read(source: Source) -> Record:
     for name in others:
         last = np.searchsorted(clocks[name], clocks[base], side="right") - 1
         columns[name] = columns[name][np.maximum(last, 0)]
-    record = tabulated(source, _wide(header[when], times[base], columns))
+    clock = "time" if _TIMES.fullmatch(header[when]) else header[when]
+    cells = {name: [*map(repr, y.tolist())] for name, y in columns.items()}
+    record = of_columns(source, {clock: times[base], **cells})
     held = [f"Held from value to value, the first before it: {', '.join(others)}."] if others else []
     return record.replace(provenance=source.provenance("tidy", *record.provenance.notes, *held))
 
@@ -106,18 +108,6 @@ def _clocks(source: Source, times: dict[str, list[str]], name: str) -> dict[str,
         raise source.bad(f"expected times of one form in '{name}', got different ones") from None
     ends = np.cumsum([len(each) for each in times.values()])[:-1]
     return dict(zip(times, np.split(every, ends), strict=True))
-
-
-def _wide(clock: str, times: Sequence[str], columns: dict[str, Array]) -> str:
-    """The same as a table with a column for each signal."""
-    head = ",".join(csv_cell(name) for name in ("time" if _TIMES.fullmatch(clock) else clock, *columns))
-    rows = zip(times, *(y.tolist() for y in columns.values()), strict=True)
-    return "\n".join([head, *(",".join([t, *map(repr, ys)]) for t, *ys in rows)]) + "\n"
-
-
-def csv_cell(text: str) -> str:
-    """A name that holds a comma is quoted."""
-    return f'"{text}"' if "," in text else text
 
 
 def _recognises(source: Source) -> bool:
