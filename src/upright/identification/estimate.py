@@ -31,6 +31,7 @@ from upright.identification.inference.loop import standing
 from upright.identification.inference.neglected import is_driven, lateness, neglected, together_late, with_force
 from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
+from upright.identification.inference.so_far import Lookout, SoFar
 from upright.identification.inference.ties import ties, with_ties
 from upright.identification.inference.verdict import judge, trusted
 from upright.identification.inference.verdict.evidence import Evidence
@@ -44,7 +45,14 @@ from upright.identification.problem.normal_equations import correlation
 from upright.identification.problem.residuals import Problem, formulate, idle, unreached, unresolved
 from upright.identification.problem.simulated import with_noise
 from upright.identification.problem.trips import Moments, unasked_trips, with_trip_guesses
-from upright.identification.search.descent import Descent, SearchLog, descend, descend_progressively, first_horizon
+from upright.identification.search.descent import (
+    Descent,
+    SearchLog,
+    descend,
+    descend_progressively,
+    first_horizon,
+    unseen,
+)
 from upright.identification.search.strategy import (
     ATTEMPTS,
     FEW,
@@ -81,7 +89,7 @@ LOWER = 2
 @one_thread()
 def identify(
     rig: GreyBox, runs: Sequence[Run], *, method: str = "auto", progress: Progress = silent, watch: bool = True,
-    near: Fit | None = None,
+    near: Fit | None = None, show: Callable[[SoFar], None] | None = None,
 ) -> Fit:  # fmt: skip
     """Estimate a rig's parameters from its runs.
 
@@ -100,6 +108,8 @@ def identify(
         Whether stretches that something else than the input moved are named, and left out in a second fit.
     near : Fit, optional
         Of nearly the same runs: the search begins there, and asks for friction that this fit left out once more.
+    show : callable, optional
+        Called some two times a second with what the search has come to.
 
     Returns
     -------
@@ -116,10 +126,11 @@ def identify(
     moments = Moments(rig)
     fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     conventions = cache(lambda: wrong_conventions(rig, fitted))
+    look = unseen if show is None else Lookout(show)
 
     def located(retained: Sequence[Run], near: Fit | None) -> ProvisionalFit:
-        looking = watch and retained is runs
-        return _provisional(rig, retained, method, progress, moments, conventions, watch=looking, near=near)
+        looking, log = watch and retained is runs, SearchLog(progress=progress, conventions=conventions, look=look)
+        return _provisional(rig, retained, method, moments, log, watch=looking, near=near)
 
     first = located(runs, near)
     if not watch or first.fit.interrupted or first.fit.failed:
@@ -133,14 +144,12 @@ def identify(
 
 
 def _provisional(
-    rig: GreyBox, runs: Sequence[Run], method: str, progress: Progress, moments: Moments,
-    conventions: Callable[[], Sequence[str]], *, watch: bool, near: Fit | None,
+    rig: GreyBox, runs: Sequence[Run], method: str, moments: Moments, log: SearchLog, *, watch: bool, near: Fit | None,
 ) -> ProvisionalFit:  # fmt: skip
-    """Where the search ends; `moments` and `conventions` are those of all samples."""
+    """Where the search ends; `moments` and the conventions of the `log` are those of all samples."""
     began = time.perf_counter()
     fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
-    log = SearchLog(progress=progress, conventions=conventions)
     log.warnings += unasked_trips(rig, fitted, moments)
     try:
         problem, optimum = find_optimum(rig, fitted, method, log, near)

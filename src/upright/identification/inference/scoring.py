@@ -54,7 +54,7 @@ def score_run(problem: Problem, index: int, x: Array, seconds: float | None = No
         return _score_ahead(problem, index, x, track.ahead, here.seconds if here is not None else seconds or track.dt)
     y = problem.simulate(index, x[:, None], track.length)[..., 0]
     if not track.windowed:
-        t, measured, simulated = run.t, track.y, y[:, 0, :]
+        t, measured, simulated = run.t[:: round(track.dt / run.period)], track.y, y[:, 0, :]
     else:
         # every sample once: a window's last sample is the next one's first and belongs to the prediction
         rows = (track.restarts[None, :] + np.arange(track.length)[:, None])[1:]

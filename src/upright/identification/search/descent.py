@@ -36,6 +36,10 @@ class Descent:
     interrupted: bool = False
 
 
+def unseen(problem: Problem, x: Array) -> None:
+    """Look at nothing; the default."""
+
+
 @dataclass
 class SearchLog:
     """What happened on the way: stages with their cost and simulations, and the best so far should one interrupt.
@@ -44,7 +48,8 @@ class SearchLog:
     since and where, `valleys` the same of where else descents ended, `rivals` values of another model that the data do
     not refuse, `unresolved` lengths below the rounding, `unreached` limits and `idle` numbers, with the term that they
     shape. `conventions` says which signs and zeros look wrong; evaluated only when a fit is poor, since no search mends
-    a reversed sign. `path` are the mean squared residual and the shared numbers after each accepted step.
+    a reversed sign. `path` are the mean squared residual and the shared numbers after each accepted step, which `look`
+    is called with.
     """
 
     progress: Progress = silent
@@ -59,12 +64,14 @@ class SearchLog:
     idle: dict[str, str] = field(default_factory=dict[str, str])
     conventions: Callable[[], Sequence[str]] = tuple
     path: list[tuple[float, dict[str, float]]] = field(default_factory=list[tuple[float, dict[str, float]]])
+    look: Callable[[Problem, Array], None] = unseen
 
     def step(self, stage: str, share: float, cost: float, problem: Problem, x: Array, horizon: float) -> None:
         """Report progress, and keep where an accepted step of the descent led, at most `LONGEST` of them."""
         self.tell(stage, share, cost, problem)
         if len(self.path) < LONGEST:
             self.path.append((cost / max(problem.count(horizon), 1), problem.shared_at(x)))
+        self.look(problem, x)
 
     def tell(self, stage: str, share: float, cost: float, problem: Problem) -> None:
         """Report progress, with the cost reached and the simulations made."""
