@@ -1,10 +1,11 @@
 // Screen Identify: a log, its fit as it goes, what it came to.
 
 import { lock } from "./bar";
+import { drawChart } from "./chart";
 import { type Curve, drawCurves } from "./curves";
 import { byId, italic, make, say } from "./dom";
 import type { Session } from "./session";
-import { short, shownUnit, symbol } from "./words";
+import { short, shownUnit, signed, symbol } from "./words";
 
 interface Log {
   id: string;
@@ -29,9 +30,22 @@ interface Fitted {
 
 interface Identified {
   logs: Log[];
-  now: { id: string; name: string; step: string; seconds: number } | null;
+  /** `looks` counts the pictures of what it has come to. */
+  now: { id: string; name: string; step: string; seconds: number; looks: number } | null;
   failed: string;
   fits: Fitted[];
+}
+
+interface Drawn {
+  run: string; role: "fit" | "predict"; signal: string; unit: string; meaning: string; fit: string; from: number;
+  ahead: number; measured: Curve; predicted: Curve;
+}
+
+/** What a fit that goes on has come to: simulations with the percent explained of each signal, the best curves. */
+interface Picture {
+  id: string;
+  explained: [number, Record<string, number>][];
+  curves?: Drawn[];
 }
 
 interface Facts {
@@ -46,10 +60,7 @@ interface Facts {
   /** Numbers that nobody measured, and that were taken to be so. */
   assumed: { name: string; meaning: string; value: string }[];
   parameters: { symbol: string; meaning: string; value: string; interval: string; unit: string; status: string; tone: string }[];
-  curves: {
-    run: string; role: "fit" | "predict"; signal: string; unit: string; meaning: string; fit: string; from: number;
-    ahead: number; measured: Curve; predicted: Curve;
-  }[];
+  curves: Drawn[];
 }
 
 const SOON = 500, LATER = 3000, LARGEST = 20; // ms, MB
@@ -70,6 +81,7 @@ export class Identify {
   private readonly address: string;
   private identified: Identified | undefined;
   private facts: Facts | undefined;
+  private picture: Picture | undefined;
   /** Fit that is shown, and the log that is to be chosen once it is listed. */
   private shown = "";
   private wanted = "";
@@ -118,6 +130,7 @@ export class Identify {
       this.identified = (await answer.json()) as Identified;
       this.lists(before);
       const { now, failed, fits } = this.identified;
+      if (now && now.looks !== (before?.now?.id === now.id ? before.now.looks : 0)) await this.look();
       if (before?.now && !now) this.ended(failed, fits[0]);
       else if (!this.shown && fits[0]) await this.open(fits[0].id);
     }
@@ -138,10 +151,27 @@ export class Identify {
     lock(byId("fit-again"), session.unsteerable || busy || (now ? "A log is being identified." : ""));
     byId<HTMLInputElement>("fit-file").disabled = session.unsteerable !== "" || busy !== "";
     byId("fit-going").hidden = !now;
+    byId("fit-live").hidden = !now || this.picture?.id !== now.id;
+    byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden;
     if (now) {
       say(byId("fit-step"), `${now.step}, ${now.seconds.toFixed(0)} s`);
       this.say(`Identifying ${now.name}.`);
     }
+  }
+
+  /** What the fit that goes on has come to. */
+  private async look(): Promise<void> {
+    const answer = await fetch(`${this.address}/fits/now`).catch(() => undefined);
+    if (!answer?.ok) return;
+    const before = this.picture, picture = (this.picture = (await answer.json()) as Picture);
+    const last = picture.explained.at(-1);
+    if (!last) return;
+    this.state();
+    const shares = Object.entries(last[1]).map(([signal, percent]) => `${symbol(signal)} ${signed(percent, 0)} %`).join(", ");
+    say(byId("fit-live-says"), `After ${last[0].toLocaleString("en-GB")} simulations the latest step explains ${shares}.`);
+    const known = (of: Picture | undefined) => of && JSON.stringify([of.id, of.curves?.map((curve) => curve.signal)]);
+    if (known(before) !== known(picture)) byId("fit-live-pictures").replaceChildren(...(picture.curves ?? []).map((curve) => this.pictured(curve)));
+    this.draw();
   }
 
   private say(text: string): void {
@@ -233,8 +263,7 @@ export class Identify {
   }
 
   private build(facts: Facts): void {
-    byId("fit-result").hidden = false;
-    byId("fit-curves").hidden = false;
+    this.state();
     const [headline = "", ...rest] = facts.verdict.split(/(?<=\.) (?=[A-Z])/);
     say(byId("fit-verdict"), headline);
     byId("fit-verdict").className = `share ${facts.sound ? "sound" : "unsound"}`;
@@ -249,20 +278,36 @@ export class Identify {
     byId("fit-assumed").replaceChildren(...facts.assumed.map(({ name, meaning, value }) => make("label", { class: "field" },
       make("span", {}, ...printed(name), ` ${meaning}`), make("input", { type: "text", name, maxlength: "60", placeholder: value }))));
     byId<HTMLAnchorElement>("fit-file-link").href = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.fit`;
-    byId("fit-pictures").replaceChildren(...facts.curves.flatMap((curve) => {
-      const { unit } = shownUnit(curve.unit), name = short(curve.meaning), how = curve.ahead ? `, ${curve.ahead} s ahead` : "";
-      const title = make("h3", {}, italic(symbol(curve.signal)), ` ${name} `, make("span", { class: "unit" }, `[${unit}], ${curve.role === "fit" ? "fitted" : "predicted"}${how}: ${curve.fit}`));
-      return [make("div", { class: "curve" }, title, make("canvas", { role: "img", "aria-label": `${name}, measured and by the model; ${curve.fit} explained` }))];
+    byId("fit-pictures").replaceChildren(...facts.curves.map((curve) => {
+      const how = curve.ahead ? `, ${curve.ahead} s ahead` : "";
+      return this.pictured(curve, `, ${curve.role === "fit" ? "fitted" : "predicted"}${how}: ${curve.fit}`, `; ${curve.fit} explained`);
     }));
     byId("fit-tested").hidden = !facts.curves.some((curve) => curve.role === "predict");
     this.draw();
   }
 
+  private pictured({ unit, meaning, signal }: Drawn, how = "", explained = ""): HTMLElement {
+    const name = short(meaning), title = make("h3", {}, italic(symbol(signal)), ` ${name} `, make("span", { class: "unit" }, `[${shownUnit(unit).unit}]${how}`));
+    return make("div", { class: "curve" }, title, make("canvas", { role: "img", "aria-label": `${name}, measured and by the model${explained}` }));
+  }
+
   private draw(): void {
-    if (!this.visible || !this.facts) return;
-    document.querySelectorAll<HTMLCanvasElement>("#fit-pictures canvas").forEach((canvas, k) => {
-      const curve = this.facts!.curves[k]!;
-      drawCurves(canvas, { ...curve, from: curve.role === "predict" ? curve.from : 0, scale: shownUnit(curve.unit).scale, colour: `--q${k % 4}` });
+    if (!this.visible) return;
+    const drawn = (where: string, curves: Drawn[]) => document.querySelectorAll<HTMLCanvasElement>(`#${where} canvas`).forEach((canvas, k) => {
+      const curve = curves[k];
+      if (curve) drawCurves(canvas, { ...curve, from: curve.role === "predict" ? curve.from : 0, scale: shownUnit(curve.unit).scale, colour: `--q${k % 4}` });
+    });
+    if (this.facts) drawn("fit-pictures", this.facts.curves);
+    const { explained, curves } = this.picture ?? { explained: [] };
+    if (!explained.length) return;
+    drawn("fit-live-pictures", curves ?? []);
+    const most = explained.at(-1)![0], signals = Object.keys(explained.at(-1)![1]);
+    drawChart(byId<HTMLCanvasElement>("fit-live-share"), {
+      x: { low: 0, high: most, unit: "" }, y: { low: 0, high: 100, unit: "%" },
+      lines: signals.map((signal, k) => ({
+        x: explained.map(([count]) => count), y: explained.map(([, percents]) => Math.max(0, percents[signal] ?? NaN)),
+        colour: `--q${k % 4}`, dashes: k % 2 ? [6, 3] : [], name: symbol(signal),
+      })),
     });
   }
 

@@ -38,6 +38,16 @@ def ends_when_interrupted(progress):
         return "the best so far"
 
 
+def draws(progress, show):
+    try:
+        while True:
+            show([0.0] * 100_000)
+    except KeyboardInterrupt:
+        finish()
+        show(["the last"])
+        return "drawn"
+
+
 def dies(progress):
     os.kill(os.getpid(), signal.SIGKILL)
 

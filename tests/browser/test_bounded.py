@@ -47,6 +47,19 @@ def test_an_interrupted_task_gives_what_it_has_and_is_interrupted_once():
     assert job.run() == "the best so far"
 
 
+def test_an_interrupt_leaves_every_picture_whole_however_many_are_on_their_way():
+    pictures = []
+
+    def show(picture):
+        pictures.append(picture)
+        job.interrupt()
+
+    job = Bounded(tasks.draws, seconds=AMPLE, grace=AMPLE, show=show)
+    assert job.run() == "drawn"
+    assert {len(each) for each in pictures[:-1]} == {100_000}
+    assert pictures[-1] == ["the last"]
+
+
 def test_an_interrupt_that_comes_before_the_process_is_there_is_kept_for_it():
     job = Bounded(tasks.never_ends, seconds=AMPLE, grace=AMPLE)
     job.interrupt()

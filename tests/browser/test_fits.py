@@ -9,7 +9,7 @@ import pytest
 
 from tests.browser.runs import SOON, settled, twin
 from tests.browser.test_served import Client, client, got
-from upright.browser.identify.fits import LARGEST, MOST, OWN, Identifications, shown_name
+from upright.browser.identify.fits import LARGEST, LOOKS, MOST, OWN, Identifications, shown_name
 from upright.browser.identify.routes import WHO
 from upright.browser.serve import Bench
 from upright.errors import BadInput
@@ -113,12 +113,24 @@ def test_one_fit_at_a_time_and_an_interrupt_reaches_it(made):
     carry.progress("first 1 s", 0.2)
     now = fits.described()["now"]
     assert (now["name"], now["step"]) == ("swing.csv", "first 1 s")
+    assert (now["looks"], fits.picture()) == (0, {"id": "fit-1", "explained": []})
+    curves = [{"signal": "theta"}]
+    carry.bounds["show"]({"evaluations": 40, "explained": {"theta": 20.0}, "curves": curves})
+    carry.bounds["show"]({"evaluations": 90, "explained": {"theta": 10.0}})  # worse, so that the curves stay
+    explained = [[40, {"theta": 20.0}], [90, {"theta": 10.0}]]
+    assert fits.picture() == {"id": "fit-1", "explained": explained, "curves": curves}
+    for k in range(10 * LOOKS):
+        carry.bounds["show"]({"evaluations": 100 + k, "explained": {"theta": 30.0}})
+    assert len(fits.picture()["explained"]) <= LOOKS
+    assert fits.picture()["explained"][0] == explained[0]
+    assert fits.described()["now"]["looks"] == 2 + 10 * LOOKS
     fits.interrupt()
     assert carry.interrupted == 1
     carry.go()
     assert settled(fits, lambda each: each.described()["now"] is None)
     described = fits.described()
     assert (described["failed"], described["fits"]) == ("Nothing moves.", [])
+    assert fits.picture() is None
 
 
 def test_of_a_brought_log_its_columns_tell_the_rig_unless_somebody_says_it_is_this_one(made, rig):
@@ -182,6 +194,7 @@ def test_more_than_may_come_is_refused_before_it_comes(bench):
 def test_nothing_else_of_the_fits_answers(bench):
     for path in (
         "api/rigs/nobody/fits", "rigs/furuta/fits/fit-1.json", "rigs/furuta/fits/..%2f..%2ffuruta.toml",
-        "rigs/furuta/fits/fit-1.toml", "rigs/nobody/fits/fit-1.html",
+        "rigs/furuta/fits/fit-1.toml", "rigs/nobody/fits/fit-1.html", "api/rigs/furuta/fits/now",
+        "api/rigs/nobody/fits/now",
     ):  # fmt: skip
         assert got(bench, path)[0] == 404

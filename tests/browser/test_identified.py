@@ -165,6 +165,8 @@ def test_a_run_is_identified_by_keyboard_alone(server, chromium):
         tab_to(page, "#fit-begin")
         page.keyboard.press("Enter")
         one.reads("#fit-step", "evaluations")
+        one.reads("#fit-live-says", r"After \d+ simulations the latest step explains ψ")
+        assert page.locator("#fit-live-pictures canvas").count() == 2
         tab_to(page, "#fit-interrupt")
         identified(one, "model")
         assert page.locator("#fit-rows th", has_text="inertia of disk and arm").count() == 1

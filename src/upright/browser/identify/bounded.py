@@ -10,7 +10,8 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -34,12 +35,15 @@ class Bounded:
         Of a module; called with the arguments and a `Progress`, it gives a text.
     seconds, grace : float
         After so long it is interrupted, and after the grace ended [s].
+    show : callable, optional
+        Called with the pictures, as JSON holds them, that the task gives to a second callable.
     """
 
     def __init__(
-        self, task: Callable[..., str], *arguments: Any, seconds: float, grace: float = 0.0, progress: Progress = silent
-    ) -> None:
-        self._task, self._arguments, self._progress = task, arguments, progress
+        self, task: Callable[..., str], *arguments: Any, seconds: float, grace: float = 0.0,
+        progress: Progress = silent, show: Callable[[Any], None] | None = None,
+    ) -> None:  # fmt: skip
+        self._task, self._arguments, self._progress, self._show = task, arguments, progress, show
         self._seconds, self._grace = seconds, grace
         self._stopping = threading.Event()
         self._process: Any = None
@@ -66,8 +70,9 @@ class Bounded:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe(duplex=False)
         self._process = context.Process(
-            target=_perform, args=(theirs, self._task, self._arguments), daemon=True, name="upright clerk"
-        )
+            target=_perform, args=(theirs, self._task, self._arguments, self._show is not None), daemon=True,
+            name="upright clerk",
+        )  # fmt: skip
         with ignoring():
             self._process.start()
         theirs.close()
@@ -98,6 +103,8 @@ class Bounded:
                 ready = True
             elif kind == "progress":
                 self._progress(*content)
+            elif kind == "picture" and self._show is not None:
+                self._show(*content)
             elif kind == "answer":
                 return str(content[0])
             elif kind == "interrupted":
@@ -111,14 +118,16 @@ def finish() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, ...]) -> None:
+def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, ...], shows: bool) -> None:
     end_with_parent()
     if hasattr(os, "nice"):
         os.nice(10)
     _limit()
 
     def send(*content: Any) -> None:
-        pipe.send_bytes(json.dumps(content).encode())
+        data = json.dumps(content).encode()
+        with _uninterrupted():  # half a message would be the last that is understood
+            pipe.send_bytes(data)
 
     last = 0.0
 
@@ -133,7 +142,7 @@ def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, .
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])  # blocked where a thread started it
         send("ready")
-        text = task(*arguments, progress)
+        text = task(*arguments, progress, *([lambda picture: send("picture", picture)] if shows else []))
         finish()
         send("answer", text)
     except UprightError as error:
@@ -146,6 +155,18 @@ def _perform(pipe: Connection, task: Callable[..., str], arguments: tuple[Any, .
         traceback.print_exc()
         send("error", f"it stopped by a fault of the program ({type(error).__name__}); see what the server printed.")
     pipe.close()
+
+
+@contextmanager
+def _uninterrupted() -> Generator[None]:
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _limit() -> None:

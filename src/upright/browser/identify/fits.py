@@ -25,6 +25,8 @@ MOST = 50
 """Logs that somebody brought, at most."""
 READING, FITTING, GRACE = 120.0, 900.0, 120.0
 """Time for reading such a log; for a fit until it is interrupted; and for it to write what it has [s]."""
+LOOKS = 400
+"""Points of the picture of a fit that goes on, at most; of more every second one is left out."""
 OWN, COLUMNS = "rig", "columns"
 """Who says what a log is of: what is known of the rig, or its columns."""
 
@@ -47,6 +49,7 @@ class Identifications:
         self._job: Bounded | None = None
         self._now: Facts | None = None
         self._failed = ""
+        self._picture: Facts = {}
 
     def keep(self, name: str, data: bytes) -> Facts:
         """Keep a log, once a reader has read it.
@@ -112,9 +115,9 @@ class Identifications:
             rig = self._rig.rig_path if known["own"] or of == OWN else None
             self._job = self._carry(
                 begin_identification, path, name, rig, dict(measured), self._folder / "fits" / key,
-                seconds=FITTING, grace=GRACE, progress=self._progress,
+                seconds=FITTING, grace=GRACE, progress=self._progress, show=self._show,
             )  # fmt: skip
-            self._failed = ""
+            self._failed, self._picture = "", {"explained": []}
             self._now = {
                 "id": key,
                 "log": log,
@@ -122,6 +125,7 @@ class Identifications:
                 "name": _name(known),
                 "step": "starting",
                 "since": time.time(),
+                "looks": 0,
             }
         threading.Thread(target=self._run, args=(self._job, dict(self._now)), name=key, daemon=True).start()
 
@@ -151,6 +155,11 @@ class Identifications:
         known = [_read(path) for path in (self._folder / "fits").glob("fit-*/fit-*.json")]
         return sorted(known, key=lambda fit: -fit["since"])
 
+    def picture(self) -> Facts | None:
+        """What the fit that is on its way has come to: shares explained by evaluation, the best curves so far."""
+        with self._lock:
+            return None if self._now is None else {"id": self._now["id"], **self._picture}
+
     def file(self, key: str, name: str) -> Path | None:
         """A file of a fit that is written."""
         there = any(fit["id"] == key for fit in self.listed())
@@ -166,6 +175,17 @@ class Identifications:
         with self._lock:
             if self._now is not None:
                 self._now["step"] = step
+
+    def _show(self, picture: Facts) -> None:
+        with self._lock:
+            if self._now is not None:
+                point = [picture["evaluations"], picture["explained"]]
+                looked = [*self._picture["explained"], point]
+                self._picture = {
+                    "explained": looked[::2] if len(looked) > LOOKS else looked,
+                    "curves": picture.get("curves", self._picture.get("curves", [])),
+                }
+                self._now["looks"] += 1
 
     def _run(self, job: Bounded, now: Facts) -> None:
         failed = ""

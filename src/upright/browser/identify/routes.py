@@ -36,6 +36,11 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list
         own = fits.get(request.path_params["name"])
         return nothing() if own is None else JSONResponse(await asyncio.to_thread(own.described))
 
+    async def picture(request: Request) -> Response:
+        own = fits.get(request.path_params["name"])
+        now = None if own is None else own.picture()
+        return nothing() if now is None else JSONResponse(now)
+
     async def written(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
         key, _, end = request.path_params["file"].rpartition(".")
@@ -78,6 +83,7 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list
 
     return [
         Route("/api/rigs/{name}/fits", described, methods=["GET"]),
+        Route("/api/rigs/{name}/fits/now", picture, methods=["GET"]),
         Route("/api/rigs/{name}/fits", for_operator(begin), methods=["POST"]),
         Route("/api/rigs/{name}/fits", for_operator(interrupt), methods=["DELETE"]),
         Route("/api/rigs/{name}/logs", for_operator(bring), methods=["POST"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +16,10 @@ from upright.experiments.stand.known import bench_values, model_of
 from upright.files import plain_values, replace_file
 from upright.identification.estimate import identify
 from upright.identification.inference.assumptions import assumption_sentences
+from upright.identification.inference.so_far import SoFar
 from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.runs import FITTED_SHARE, LEAST_RUN
+from upright.physics import Plant
 from upright.progress import Progress
 from upright.quantities import with_unit
 from upright.records import Array, Record
@@ -34,13 +36,14 @@ from upright.study.load import Study
 from upright.study.results import fit_content, write_fit
 from upright.study.windows import windows
 
-BUCKETS = 300
-"""Of a curve in the page; a bucket has its least and its greatest sample."""
+BUCKETS, FEW = 300, 150
+"""Of a curve in the page, and while a fit goes on; a bucket has its least and its greatest sample."""
 
 
 def identify_log(
-    path: Path, name: str, rig: Path | None, measured: Mapping[str, str], folder: Path, progress: Progress
-) -> str:
+    path: Path, name: str, rig: Path | None, measured: Mapping[str, str], folder: Path, progress: Progress,
+    show: Callable[[dict[str, Any]], None] | None = None,
+) -> str:  # fmt: skip
     """Fit a log, and write fit.json, report.html and what the page shows into a folder; the verdict.
 
     Parameters
@@ -49,6 +52,8 @@ def identify_log(
         RIG.toml of the rig that was logged; None where the columns are to tell what it was.
     measured : mapping of str to str
         Numbers that somebody measured, with their units.
+    show : callable, optional
+        Called with what the search has come to, as the page draws it.
 
     Raises
     ------
@@ -61,7 +66,7 @@ def identify_log(
     study = _tested(study)
     if not study.model.estimated:
         raise BadInput(f"every number of {study.title} is known, so that nothing is left to estimate.")
-    fit = identify(study.model, study.runs, progress=progress)
+    fit = identify(study.model, study.runs, progress=progress, show=None if show is None else _shower(study, show))
     finish()
     folder.mkdir(parents=True)
     write_fit(fit, study, folder / "fit.json")
@@ -77,7 +82,7 @@ def identify_log(
             {"name": n, "meaning": p.meaning, "value": f"{number(p.value)} {unit(p.unit)}".strip()}
             for n, p in fit.model.parameters.items() if p.assumed
         ],
-        "parameters": _parameters(fit), "curves": _curves(fit),
+        "parameters": _parameters(fit), "curves": _curves(fit.model.plant, _shown(fit.runs)),
     }  # fmt: skip
     replace_file(folder / "facts.json", json.dumps(plain_values(facts)).encode())
     return page.verdict
@@ -131,17 +136,27 @@ def _parameters(fit: Fit) -> list[dict[str, str]]:
     return rows
 
 
-def _curves(fit: Fit) -> list[dict[str, Any]]:
+def _shower(study: Study, show: Callable[[dict[str, Any]], None]) -> Callable[[SoFar], None]:
+    def picture(so_far: SoFar) -> None:
+        curves = {} if so_far.runs is None else {"curves": _curves(study.model.plant, so_far.runs, FEW)}
+        explained = {name: round(percent, 2) for name, percent in so_far.explained.items()}
+        show({"evaluations": so_far.evaluations, "explained": explained, **curves})
+
+    return picture
+
+
+def _curves(plant: type[Plant], runs: Mapping[str, RunScore], buckets: int = BUCKETS) -> list[dict[str, Any]]:
     """Signals as measured and as the model has them, thinned."""
-    units = {c.name: (c.unit, c.meaning) for c in fit.model.plant.coordinates}
+    units = {c.name: (c.unit, c.meaning) for c in plant.coordinates}
     return [
         {
             "run": label, "role": score.role, "signal": name, "unit": units.get(name, ("", name))[0],
             "meaning": units.get(name, ("", name))[1], "fit": percent(score.fit_percent.get(name, math.nan)),
             "from": float(score.t[0]) + score.score_from, "ahead": score.horizon or 0.0,
-            "measured": _thinned(score.t, score.y[:, k]), "predicted": _thinned(score.t, score.simulated[:, k]),
+            "measured": _thinned(score.t, score.y[:, k], buckets),
+            "predicted": _thinned(score.t, score.simulated[:, k], buckets),
         }
-        for label, score in _shown(fit.runs).items() for k, name in enumerate(score.measured)
+        for label, score in runs.items() for k, name in enumerate(score.measured)
     ]  # fmt: skip
 
 
@@ -151,6 +166,6 @@ def _shown(runs: Mapping[str, RunScore]) -> Mapping[str, RunScore]:
     return predicted or runs
 
 
-def _thinned(t: Array, y: Array) -> list[list[float | None]]:
-    times, values = decimated(t, y, BUCKETS)
+def _thinned(t: Array, y: Array, buckets: int) -> list[list[float | None]]:
+    times, values = decimated(t, y, buckets)
     return [[float(f"{v:.5g}") if math.isfinite(v) else None for v in column] for column in (times, values)]
