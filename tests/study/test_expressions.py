@@ -74,3 +74,16 @@ def test_no_text_does_more_than_yield_numbers_or_a_sentence(text):
         return
     assert value.shape == T.shape
     assert np.isfinite(value).all()
+
+
+def test_an_integral_is_that_of_the_curve_through_the_samples():
+    t = np.linspace(0.5, 3.5, 301)
+    found = evaluate("integral(2*cos(3*`t`) + 1)", {"t": t}, t)
+    # a cubic spline's error is h^4 times the fourth derivative at most, over the length
+    np.testing.assert_allclose(found, 2 / 3 * (np.sin(3 * t) - np.sin(1.5)) + t - 0.5, rtol=0, atol=3 * 162 * 0.01**4)
+
+
+def test_an_integral_of_a_constant_is_a_line_and_atan2_keeps_the_quadrant():
+    t = np.linspace(0, 1, 11)
+    np.testing.assert_allclose(evaluate("integral(2)", {}, t), 2 * t, atol=1e-12)
+    np.testing.assert_allclose(evaluate("atan2(-1, -1)", {}, t), -0.75 * np.pi)

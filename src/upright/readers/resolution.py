@@ -79,12 +79,19 @@ def rebuild(t: Array, index: Array | None = None) -> tuple[Array, str]:
     evidence of rounding, `t` comes back as it was with an empty sentence.
 
     The evidence: all times are multiples of 1, 0.1 or 0.01 ms (or 1 s, 0.1 s, 10 ms), the steps take two
-    neighbouring multiples only, and the rounding is coarse beside the period.
+    neighbouring multiples only, and the rounding is coarse beside the period. Or all have a few significant digits, so
+    that late times are coarser than early ones, and one period explains them all.
     """
     n = t.size
     if n < 8 or not (np.diff(t) > 0).all():
         return t, ""
     count = np.arange(n, dtype=np.float64) if index is None else index - index[0]
+    if (digits := _digits(t)) and (period := _one_period(t, count, _last_digit(t, digits))):
+        uniform = t[0] + period * count
+        return uniform, (
+            f"Time has {digits} significant digits; rebuilt with the period of {period * 1e3:.6g} ms that explains "
+            f"every stamp (they wander up to {float(np.abs(uniform - t).max()) * 1e3:.2g} ms from it)."
+        )
     step = rounding(t)
     span = float(count[-1])
     period = float(t[-1] - t[0]) / span
@@ -104,6 +111,30 @@ def rebuild(t: Array, index: Array | None = None) -> tuple[Array, str]:
         f"Time was rounded to {step * 1e3:g} ms; rebuilt from the sample index with a period of {period * 1e3:.6g} ms"
         f" (the logged stamps wander up to {wander * 1e3:.2g} ms from it)."
     )
+
+
+def _last_digit(t: Array, digits: int) -> Array:
+    """What one in the last of so many significant digits is worth, in each time."""
+    return 10.0 ** (np.floor(np.log10(np.maximum(np.abs(t), 1e-9)) + 1e-12) + 1 - digits)
+
+
+def _digits(t: Array) -> int:
+    """Significant digits that every time has, where they are few and coarse beside a period; 0 otherwise."""
+    period = float(t[-1] - t[0]) / (t.size - 1)
+    for digits in range(3, 7):
+        last = _last_digit(t, digits)
+        if last[-1] < _MATTERS * period:
+            return 0
+        if last[-1] > 1.5 * last[t.size // 4] and (np.abs(t / last - np.round(t / last)) < 1e-6 * t.size).all():
+            return digits
+    return 0
+
+
+def _one_period(t: Array, count: Array, last: Array) -> float:
+    """Period for which no time is off by more than half its last digit; 0 where there is none."""
+    most, since = 0.5 * (last[1:] + last[0]) * (1 + 1e-6), t[1:] - t[0]
+    low, high = float(((since - most) / count[1:]).max()), float(((since + most) / count[1:]).min())
+    return (low + high) / 2 if low <= high else 0.0
 
 
 def rounding(t: Array) -> float:

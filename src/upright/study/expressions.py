@@ -28,6 +28,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     "max": (np.maximum, 2),
     "clip": (np.clip, 3),
     "mod": (np.mod, 2),
+    "atan2": (np.arctan2, 2),
 }
 """Functions by name, with their number of arguments."""
 
@@ -55,7 +56,8 @@ def evaluate(expression: str, columns: Mapping[str, Array], t: Array) -> Array:
     Parameters
     ----------
     expression : str
-        Numbers, columns, ``t`` [s], ``pi``, ``+ - * / % **``, comparisons joined by ``and``/``or``, `FUNCTIONS`.
+        Numbers, columns, ``t`` [s], ``pi``, ``+ - * / % **``, comparisons joined by ``and``/``or``, `FUNCTIONS`, and
+        ``integral`` over time, from the first sample on.
     columns : mapping of str to (N,) array
         What the names stand for, in the units of the log.
     t : (N,) array
@@ -129,9 +131,11 @@ def _value(node: ast.expr, scope: Mapping[str, Any], whole: str) -> Any:
             return result
         case ast.IfExp(test=test, body=body, orelse=orelse):
             return np.where(of(test), of(body), of(orelse))
+        case ast.Call(func=ast.Name(id="integral"), args=[piece], keywords=[]):
+            return _integral(scope["t"], of(piece), whole)
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
             if name not in FUNCTIONS:
-                raise BadInput(f"'{_short(whole)}' calls '{name}'; {nearest(name, FUNCTIONS)}")
+                raise BadInput(f"'{_short(whole)}' calls '{name}'; {nearest(name, (*FUNCTIONS, 'integral'))}")
             function, count = FUNCTIONS[name]
             if len(args) != count:
                 raise BadInput(f"'{_short(whole)}': {name} takes {count} values, got {len(args)}")
@@ -139,8 +143,18 @@ def _value(node: ast.expr, scope: Mapping[str, Any], whole: str) -> Any:
         case _:
             raise BadInput(
                 f"'{_short(whole)}' uses '{_short(ast.unparse(node))}', which is no arithmetic on columns;"
-                f" allowed are numbers, columns, t, pi, + - * / % **, comparisons and {', '.join(FUNCTIONS)}"
+                f" allowed are numbers, columns, t, pi, + - * / % **, comparisons, integral and {', '.join(FUNCTIONS)}"
             )
+
+
+def _integral(t: Array, value: Any, whole: str) -> Array:
+    """From the first sample on, of the cubic spline through the samples."""
+    from scipy.interpolate import CubicSpline
+
+    values = np.broadcast_to(np.asarray(value, dtype=np.float64), t.shape)
+    if not np.isfinite(values).all() or t.size < 2:
+        raise BadInput(f"'{_short(whole)}' integrates what is not finite, or a single sample")
+    return CubicSpline(t, values).antiderivative()(t)
 
 
 def _look_up(name: str, scope: Mapping[str, Any], whole: str) -> Any:

@@ -30,7 +30,7 @@ from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.keys import names
 from upright.study.loop import Scene, read_loop, state_units
 from upright.study.rig import known_values, read_plant, read_rig
-from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors
+from upright.study.sensors import Grid, drive_unit, read_drives, read_sensors, with_derived
 from upright.study.text import Section, StudyText, as_written, in_si
 
 PathLike = str | os.PathLike[str]
@@ -135,7 +135,7 @@ def load_study(
     rig = read_rig(study, plant, drive_unit(study), fixed)
     folder = Path(data) if data is not None else path.parent
     logs = {(name, "", "", ""): record for name, record in (records or {}).items()}
-    read = read_runs(study, plant, lambda run: _log(run, folder, logs)) if runs else ()
+    read = read_runs(study, plant, lambda run: with_derived(_log(run, folder, logs), study)) if runs else ()
     hardware = read_hardware(study, plant, rig, [log.provenance.rig or "" for log in logs.values()])
     rig = with_noise(rig, read)
     if fixed is not None:

@@ -1,4 +1,4 @@
-"""Columns of a log as coordinates and commands on a uniform time base: [sensors], [drive] and [inputs] of a study."""
+"""Columns of a log as coordinates and commands on a uniform time base: [columns], [sensors], [drive] and [inputs]."""
 
 from __future__ import annotations
 
@@ -227,6 +227,28 @@ class Grid:
             return self.notes
         period = self.t[1] - self.t[0]
         return (*self.notes, f"resampled from {self.source.size} to {self.t.size} samples of {period * 1e3:.4g} ms")
+
+
+def with_derived(record: Record, study: Section) -> Record:
+    """The record with the columns of the study's ``[columns.NAME]``; each may use those before it.
+
+    Raises
+    ------
+    BadInput
+        With the study's line, when the log has a column of that name or a formula cannot be evaluated.
+    """
+    columns = study.section("columns")
+    signals, logged = dict(record.signals), dict(record.units)
+    for name in columns.values:
+        column = columns.section(name)
+        column.check(names("columns"))
+        if name in signals:
+            raise columns.error(name, f"the log has a column '{name}' of its own; choose another name")
+        formula = column.text_of("formula", "atan2(x, -y)")
+        with column.at("formula"):
+            signals[name] = expressions.evaluate(formula, signals, record.t)
+        logged[name] = read_unit(column) or ""
+    return record.replace(signals=signals, units=logged) if columns.values else record
 
 
 def read_sensors(study: Section, run: Section, plant: type[Plant]) -> dict[str, tuple[Sensor, Section]]:

@@ -9,8 +9,8 @@ import pytest
 
 from upright.physics import CartPendulum, Pendulum, find
 from upright.readers import read
+from upright.signals.release import _reach, free_from, free_stretches, free_swings
 from upright.simulation import Held, simulate
-from upright.study.draft.release import _reach, free_from, free_stretches, free_swings
 
 DT = 0.01
 PENDULUM = Pendulum(m_p=0.2, l_cg=0.3, J_p=2e-3, b_2=2e-3, b_2c=1e-3)

@@ -16,7 +16,7 @@ from upright.identification.model.fit import Fit
 from upright.progress import Progress, part
 from upright.records import Record
 from upright.rig.makes import MAKES
-from upright.study.draft.release import free_from
+from upright.signals.release import free_from
 from upright.study.load import Study
 
 HIGH, LOW = math.radians(75), math.radians(50)

@@ -14,11 +14,11 @@ from upright.physics import find
 from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS
+from upright.signals.release import free_stretches
 from upright.signals.stretches import turning_points
 from upright.signals.trips import goes_dead
 from upright.study.draft.described import COUNTS, counts_of
 from upright.study.draft.recognise import REFERENCE, Recognised, in_dac_counts
-from upright.study.draft.release import free_stretches
 
 RUNS_AWAY = 16_000
 """Counts beyond which a body is a disk: a cart of an ECP 210 has 16000 in 7 cm, and less travel than that."""

@@ -21,9 +21,10 @@ from upright.study.clock import check_clock
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
 from upright.study.draft.compare import CLEAR, DOUBTFUL, LONGEST, explained
+from upright.study.draft.derived import derived_angle
 from upright.study.draft.described import describe
 from upright.study.draft.pendulum import pendulum_tables
-from upright.study.draft.recognise import Recognised, named_after, recognise
+from upright.study.draft.recognise import Recognised, named_after, position_columns, recognise
 from upright.study.draft.suits import COUNTED, plants_that_suit
 from upright.study.draft.tables import as_logged
 from upright.study.text import TomlTable, study_text
@@ -60,6 +61,10 @@ def draft(
     if scales:
         record = in_places(record, scales)
         inspection = inspect(record)
+    derived = None if scales else derived_angle(record, inspection, places=bool(position_columns(record, inspection)))
+    if derived is not None:
+        record = derived.in_place(record)
+        inspection = inspect(record)
     recognised, tables = _drafted(record, inspection, log, study, plant)
     doubts = recognised.doubts
     if not plant:
@@ -70,6 +75,10 @@ def draft(
         rig = next(t for t in tables if t.lines and t.lines[0].startswith("[rig]"))
         rig.key("guessed", True, "the plant was not given; delete this line once you are sure of it")
     as_logged(tables, logged, scales)
+    if derived is not None:
+        sensors = next(i for i, table in enumerate(tables) if table.lines[0].startswith("[sensors."))
+        tables = [*tables[:sensors], derived.table, *tables[sensors:]]
+        doubts = (derived.doubt, *doubts)
     head = TomlTable()
     head.line(f"# Study of {log.name}, drafted by `upright init`. Check it, then: upright identify THIS_FILE -o OUT")
     head.line("# Quantities are written with units. { guess = ... } is estimated; a text or number alone is known.")

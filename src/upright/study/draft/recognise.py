@@ -15,10 +15,10 @@ from upright.readers.inspection import Column, Inspection, effort_unit, is_suppl
 from upright.records import Array, Record
 from upright.records.columns import ANGLES, LENGTHS, bare_name
 from upright.signals.regression import LeastSquares
+from upright.signals.release import free_from, free_swings
 from upright.signals.smoothing import savitzky_golay, smoothed, white_noise
 from upright.study.draft.accelerating import acceleration_command
 from upright.study.draft.hinge import hinge_of
-from upright.study.draft.release import free_from, free_swings
 from upright.units import same_dimension
 
 RATE = re.compile(r"velocity|speed|rate|_dot\b|omega|\bqd|accel", re.IGNORECASE)

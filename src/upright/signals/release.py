@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.records import Array
 from upright.signals.regression import LeastSquares
 from upright.signals.smoothing import Motion, gaussian_noise_gain, noise_gain, savitzky_golay, white_noise
 from upright.signals.stretches import stretches
+
+Array = NDArray[np.float64]
 
 HAND = 0.25
 """Share of gravity's largest pull, not explained by it, by friction or by the hinge, from which a hand is detected."""
