@@ -2,6 +2,7 @@
 
 import gc
 import os
+import time
 
 # The matrices here are small: threads of the linear algebra only wait for each other and for other tests.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -29,6 +30,12 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         print(f"\nFAILED {report.nodeid} ({report.when}, {report.duration:.0f} s)", flush=True)
 
 
+UNTIL = float(os.environ.get("UPRIGHT_TESTS_UNTIL", "inf"))
+"""Time [s since 1970] after which no slow test begins: `.ci/run` has to come to its end on a slow machine too."""
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
+    if time.time() > UNTIL and item.get_closest_marker("slow"):
+        pytest.skip("left out, since the time for slow tests is over on this machine")
     if item.get_closest_marker("real_data") and not os.path.isdir(os.environ.get("UPRIGHT_REAL_DATA", "")):
         pytest.skip("UPRIGHT_REAL_DATA does not name the folder of public logs")
