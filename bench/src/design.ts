@@ -8,7 +8,7 @@ import { type Group, LEAST, MOST_RATIO, characteristic, grouped, noise, polesOf,
 import { Regulator, branches, prices } from "./regulator";
 import type { Session } from "./session";
 import { about, drawStrip, limited } from "./strip";
-import { DEGREE, short, shownUnit, signed, significant, symbol } from "./words";
+import { DEGREE, modelName, short, shownUnit, signed, significant, symbol } from "./words";
 
 const ORDER: Fate[] = ["stands", "saturates", "falls"];
 const NAME: Record<Fate, string> = { stands: "stabilised", saturates: "stabilised with saturation", falls: "lost" };
@@ -58,7 +58,7 @@ export class Design {
     byId("cancel").addEventListener("click", () => this.confirm(false));
     new ResizeObserver(() => this.charts()).observe(byId("predicted-last"));
     new ResizeObserver(() => this.sticks()).observe(byId("fates"));
-    say(byId("lanes"), `${DATA.lanes} rigs that the model allows`);
+    say(byId("lanes"), `${DATA.lanes} rigs that the ${modelName(session.scene!.model)} allows`);
     say(byId("lanes-note"), `each let go and run for ${significant(DATA.seconds)} s, the same draw at every move`);
   }
 
@@ -127,7 +127,7 @@ export class Design {
     const { coordinates, command } = DATA, { price } = this, slider = byId("lqr-slider");
     const terms = coordinates.map(({ name, unit }, i) => `(${symbol(name)} / ${significant(this.costly[i]! * shownUnit(unit).scale)} ${shownUnit(unit).unit})²`);
     say(byId("lqr-cost"), `u = −K x with the least ∫ ${terms.join(" + ")} + ρ (u / ${significant(command.limit)} ${command.unit})² dt; speeds cost nothing.`);
-    const words = price === undefined ? "the poles were set by hand" : `ρ = ${significant(price, 2)}`;
+    const words = price === undefined ? "set by hand" : `ρ = ${significant(price, 2)}`;
     say(byId("lqr-price"), words);
     slider.setAttribute("aria-valuetext", price === undefined ? words : `price of the command ${significant(price, 2)}, ${this.groups.map(spoken).join("; ")}`);
   }

@@ -88,7 +88,8 @@ export class Identify {
   private timer = 0;
   private busy = "";
 
-  constructor(private readonly session: Session, record: () => void) {
+  /** `chosen`: another fit is shown. */
+  constructor(private readonly session: Session, record: () => void, private readonly chosen: () => void) {
     this.address = `/api/rigs/${encodeURIComponent(session.name)}`;
     const press = (id: string, act: () => void) =>
       byId(id).addEventListener("click", ({ currentTarget }) => {
@@ -277,6 +278,8 @@ export class Identify {
     byId("fit-measure").hidden = facts.assumed.length === 0;
     byId("fit-assumed").replaceChildren(...facts.assumed.map(({ name, meaning, value }) => make("label", { class: "field" },
       make("span", {}, ...printed(name), ` ${meaning}`), make("input", { type: "text", name, maxlength: "60", placeholder: value }))));
+    byId("fit-use").dataset["fit"] = this.shown;
+    this.chosen();
     byId<HTMLAnchorElement>("fit-file-link").href = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.fit`;
     byId("fit-pictures").replaceChildren(...facts.curves.map((curve) => {
       const how = curve.ahead ? `, ${curve.ahead} s ahead` : "";

@@ -6,6 +6,7 @@ import { Design } from "./design";
 import { byId, make } from "./dom";
 import { Guide } from "./guide";
 import { Identify } from "./identify";
+import { Model } from "./model";
 import { Run } from "./run";
 import { Runs } from "./runs";
 import { Session } from "./session";
@@ -57,6 +58,7 @@ async function bench(): Promise<void> {
   const scene = () => {
     if (!session.scene) return;
     bar.scene();
+    model.show();
     const { coordinates, point, kind } = session.scene, now = JSON.stringify([coordinates, point, kind, moving]);
     if (now === built) run.law();
     else run.build(moving);
@@ -79,6 +81,7 @@ async function bench(): Promise<void> {
       if (before?.state !== state?.state || before?.verdict !== state?.verdict) void runs.show();
       if (before?.state !== "starting" && state?.state === "starting") session.history.clear();
       bar.show();
+      model.show();
       design?.gate();
       track.gate();
       if (identify.visible) {
@@ -93,7 +96,8 @@ async function bench(): Promise<void> {
   const identify = new Identify(session, () => {
     byId<HTMLSelectElement>("from").value = "motions";
     run.start();
-  });
+  }, () => model.show());
+  const model = new Model(session);
   const bar = new Bar(session, { start: () => run.start(), tap: () => run.tap() });
   const show = (asked: string | undefined) => {
     const screen: Screen = (!isPhone() && SCREENS.find((s) => s === asked && !byId(`tab-${s}`).hidden)) || "run";

@@ -29,6 +29,8 @@ export interface Scene {
   poles: Complex[];
   K: number[];
   basis: { level: string; sentence: string };
+  /** Which fit of the bench describes it, and of which log that is; "" where its own RIG.toml does. */
+  model: { fit: string; of: string };
   follows: boolean;
   /** Where the law follows a reference: index of the coordinate that is looked at, and what predicts its answer. */
   tracked?: number;

@@ -59,8 +59,18 @@ export class Session {
     if (this.connection.send(request)) this.on.steered(request);
   }
 
+  /** Lets a fit describe the rig, or what came with it where there is none; why not, or "". */
+  async describe(fit: string): Promise<string> {
+    if (this.unsteerable) return this.unsteerable;
+    const headers = { "x-bench-me": this.scene?.you ?? "" }, address = `/api/rigs/${encodeURIComponent(this.name)}/model`;
+    const answer = await fetch(address, { method: "POST", headers, body: JSON.stringify({ fit }) }).catch(() => undefined);
+    return answer?.ok ? "" : ((await answer?.text()) ?? NO_CONNECTION);
+  }
+
   private received(received: ServerMessage): void {
     if (received.type === "scene") {
+      // What the page computes with is the model's that it was loaded with.
+      if (this.scene && this.scene.model.fit !== received.model.fit) return location.reload();
       const fresh = !this.connected;
       this.scene = received;
       this.followed.take(received.reference);

@@ -38,3 +38,6 @@ export function short(meaning: string): string {
   const first = meaning.split(/[,;(]/)[0]!.trim();
   return first.split(/ of (?:the )?/).at(-1)!;
 }
+
+/** What a rig is known by. */
+export const modelName = ({ fit, of }: { fit: string; of: string }): string => (fit ? `fit of ${of}` : "nominal model");

@@ -57,6 +57,9 @@ NOT_BUILT = (
 )
 
 
+ONE_MODEL = "in a class all know the same rig; upright bench by itself takes a fit for its model."
+
+
 def is_built() -> bool:
     """Whether the page is there."""
     return files("upright.browser").joinpath("page/index.html").is_file()
@@ -165,7 +168,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
             Route("/", page), Route("/assets/{name}", asset), Route("/api/rigs", rigs),
             Route("/api/rigs/{name}/runs", runs), Route("/rigs/{name}/twin.js", script),
             Route("/rigs/{name}/runs/{file}", result), WebSocketRoute("/live/{name}", live),
-            *identify_routes(hubs, fits),
+            *identify_routes(hubs, fits, fixed="" if room is None else ONE_MODEL),
             WebSocketRoute("/class", whole),
         ],
     )  # fmt: skip

@@ -27,7 +27,7 @@ class Hub:
         self.station = station
         self.clients: dict[Outbox, str] = {}
         self._issued: dict[str, None] = {}  # who has been here, the oldest first
-        self._step = step_of(station.rig.model.limit, station.rig.model.converter)
+        self._rig, self._step = station.rig, _step(station)
         self._next, self._late, self._answered, self._followed, self._desk = 0, 0, 0, 0, station.desk
         self._shown: Any = None
         self._scene = self._described()
@@ -57,6 +57,9 @@ class Hub:
     def turn(self) -> None:
         """Send what is new."""
         self.station.beat()
+        if self.station.rig is not self._rig:
+            self._rig, self._step = self.station.rig, _step(self.station)
+            self._scenes()
         self._samples()
         self._answer()
         self._follow()
@@ -140,3 +143,7 @@ class Hub:
         text = json.dumps(note)
         for outbox in self.clients:
             outbox.note(text)
+
+
+def _step(station: Station) -> float:
+    return step_of(station.rig.model.limit, station.rig.model.converter)

@@ -50,6 +50,8 @@ class BenchRig:
         The law as state feedback; None where it is another.
     follows : bool
         Whether the law follows a reference.
+    fit, fit_of : str
+        Which fit of the bench describes it, and of which log that is; empty where its own RIG.toml does.
     """
 
     name: str
@@ -61,6 +63,8 @@ class BenchRig:
     basis: Basis
     loop: Loop | None
     follows: bool
+    fit: str = ""
+    fit_of: str = ""
 
     @property
     def kind(self) -> str:
@@ -123,6 +127,7 @@ class BenchRig:
             "poles": [] if self.loop is None else self.poles(self.loop.K),
             "K": [] if self.loop is None else self.loop.K[0].tolist(),
             "follows": self.follows, "basis": self.basis.plain(), **self._loop_to_follow,
+            "model": {"fit": self.fit, "of": self.fit_of},
             "lean": self.lean, "facts": facts(self.model, self.at, self.tracked),
         }  # fmt: skip
 
@@ -174,25 +179,36 @@ def known_rig(path: Path, law: Path | None, folder: Path) -> BenchRig:
     BadInput
         When a file cannot be used, or a rig that can really move has no law.
     """
-    file = read_rig_file(path)
-    model, _ = model_and_truth(file)
-    name = re.sub(r"[^a-z0-9]+", "-", (file.name or _name(path)).lower()).strip("-")[:40] or "rig"
-    draft = BenchRig(
-        name=name, rig_path=path, law_path=law or folder / name / "law.json", file=file, model=model, law=NO_LAW,
-        basis=model.basis, loop=None, follows=False,
-    )  # fmt: skip
+    draft = _without_law(path, law, folder)
     if law is not None:
         read, basis = read_law(law)
         follows = isinstance(read, Law) and bool(np.any(read.D[:, read.readings :]))
-        return replace(
-            draft, law=read, basis=model.basis & basis, loop=_recognized(read, model, draft.at), follows=follows
-        )
-    if file.hardware:
+        loop = _recognized(read, draft.model, draft.at)
+        return replace(draft, law=read, basis=draft.basis & basis, loop=loop, follows=follows)
+    if draft.file.hardware:
         raise BadInput(f"{path} is a rig that can really move, so say which law it runs: --law design.json.")
     loop = _proposed(draft)
     draft.law_path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(draft.law_path, json.dumps(as_values(loop.law)).encode())
     return replace(draft, law=loop.law, loop=loop, follows=bool(np.any(loop.law.D[:, loop.law.readings :])))
+
+
+def write_proposed_law(path: Path, law: Path) -> str:
+    """Design a law for the rig of a RIG.toml as `upright design` proposes one, and store it with its basis."""
+    draft = _without_law(path, law, law.parent)
+    content = {"law": as_values(_proposed(draft).law), "basis": draft.basis.plain()}
+    replace_file(law, json.dumps(content).encode())
+    return ""
+
+
+def _without_law(path: Path, law: Path | None, folder: Path) -> BenchRig:
+    file = read_rig_file(path)
+    model, _ = model_and_truth(file)
+    name = re.sub(r"[^a-z0-9]+", "-", (file.name or _name(path)).lower()).strip("-")[:40] or "rig"
+    return BenchRig(
+        name=name, rig_path=path, law_path=law or folder / name / "law.json", file=file, model=model, law=NO_LAW,
+        basis=model.basis, loop=None, follows=False,
+    )  # fmt: skip
 
 
 NO_LAW = Law(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.zeros((1, 1)))

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -125,8 +126,34 @@ class Station:
         """Have its swing-up designed, once, beside everything else."""
         with self._lock:
             if self._designer is None:
-                self._designer = threading.Thread(target=self._design, name=f"{self.rig.name} designer", daemon=True)
+                design = partial(self._design, self.rig)
+                self._designer = threading.Thread(target=design, name=f"{self.rig.name} designer", daemon=True)
                 self._designer.start()
+
+    def at_rest(self) -> None:
+        """Refuse while it runs.
+
+        Raises
+        ------
+        BadInput
+            When it runs, or is on its way to rest.
+        """
+        if not self.over or self.state in (STARTING, RUNNING):
+            raise BadInput(f"{self.rig.name} runs; stop it first.")
+
+    def describe(self, who: str, rig: BenchRig) -> None:
+        """Let it be known by another description and its law, from the next start on.
+
+        Raises
+        ------
+        BadInput
+            When they do not operate it, or it runs.
+        """
+        self._operated(who)
+        with self._lock:
+            self.at_rest()
+            self.rig, self.loop, self.requested, self.origin = rig, rig.loop, None, HELD
+            self.hanging, self._held_by, self._designer = NOT_DESIGNED, None, None
 
     def start(
         self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "", origin: str = HELD
@@ -263,16 +290,22 @@ class Station:
 
     @property
     def _swing_path(self) -> Path:
-        return self.folder / "swing_up.json"
+        return self._swing_path_of(self.rig)
 
-    def _design(self) -> None:
+    def _swing_path_of(self, rig: BenchRig) -> Path:
+        return (rig.law_path.parent if rig.fit else self.folder) / "swing_up.json"
+
+    def _design(self, rig: BenchRig) -> None:
+        gains, why = None, ""
         try:
-            self._held_by = np.array([json.loads(self._swing_up(self.rig, self._swing_path))])
-            self.hanging = ""
+            gains = np.array([json.loads(self._swing_up(rig, self._swing_path_of(rig)))])
         except UprightError as error:
-            self.hanging = str(error)
+            why = str(error)
         except RuntimeError as error:  # its process was killed, as with the bench that closes meanwhile
-            self.hanging = f"Its swing-up was not designed: {error}."
+            why = f"Its swing-up was not designed: {error}."
+        with self._lock:
+            if rig is self.rig:  # a design takes seconds, in which another description may have come
+                self._held_by, self.hanging = gains, why
 
     def _operated(self, who: str) -> None:
         if self.lease.holder != who:

@@ -13,6 +13,7 @@ from typing import Any
 
 from upright.browser.answers import sentence_of
 from upright.browser.identify.bounded import Bounded
+from upright.browser.identify.fitted import fitted_rig
 from upright.browser.identify.tasks import begin_identification, begin_inspection
 from upright.browser.rig import BenchRig
 from upright.browser.runs import listed
@@ -121,7 +122,7 @@ class Identifications:
             self._now = {
                 "id": key,
                 "log": log,
-                "of": of,
+                "of": OWN if rig is not None else COLUMNS,
                 "name": _name(known),
                 "step": "starting",
                 "since": time.time(),
@@ -165,6 +166,26 @@ class Identifications:
         there = any(fit["id"] == key for fit in self.listed())
         path = self._folder / "fits" / key / name
         return path if there and path.is_file() else None
+
+    def described_by(self, key: str) -> BenchRig:
+        """The rig as a fit describes it; by its own description where the key is empty.
+
+        Raises
+        ------
+        BadInput
+            When there is no such fit, it is not of this rig, or it is not trusted.
+        """
+        if not key:
+            return self._rig
+        fit = next((each for each in self.listed() if each["id"] == key), None)
+        if fit is None:
+            raise BadInput("there is no such fit; load the page again.")
+        if fit["of"] != OWN:
+            raise BadInput(
+                "this fit is of a rig that the log's columns tell; if the log is of this rig, choose so and identify "
+                "it again."
+            )
+        return fitted_rig(self._rig, self._folder / "fits" / key / "fit.json", fit["name"])
 
     def close(self) -> None:
         """End what is on its way."""

@@ -29,8 +29,8 @@ FILES = {"html": "report.html", "json": "facts.json", "fit": "fit.json"}
 Answering = Callable[[Request], Awaitable[Response]]
 
 
-def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list[Route]:
-    """The addresses of some rigs."""
+def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixed: str = "") -> list[Route]:
+    """The addresses of some rigs; `fixed` is why they are known by their own descriptions alone, where that is so."""
 
     async def described(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
@@ -81,7 +81,18 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications]) -> list
         own.interrupt()
         return JSONResponse({})
 
+    async def adopt(request: Request, own: Identifications) -> Response:
+        key = _fit_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
+        if fixed:
+            raise BadInput(fixed)
+        hub = hubs[request.path_params["name"]]
+        hub.station.at_rest()
+        rig = await asyncio.to_thread(own.described_by, key)
+        hub.station.describe(request.headers.get(WHO, ""), rig)
+        return JSONResponse({})
+
     return [
+        Route("/api/rigs/{name}/model", for_operator(adopt), methods=["POST"]),
         Route("/api/rigs/{name}/fits", described, methods=["GET"]),
         Route("/api/rigs/{name}/fits/now", picture, methods=["GET"]),
         Route("/api/rigs/{name}/fits", for_operator(begin), methods=["POST"]),
@@ -103,6 +114,16 @@ def _wanted(text: bytes) -> tuple[str, str, dict[str, str]]:
     if not all(isinstance(text, str) and len(text) <= _TEXT for pair in known.items() for text in pair):
         raise BadInput('what was measured is a text by its name, such as {"m_p": "0.22 kg"}.')
     return log, of, known
+
+
+def _fit_named(text: bytes) -> str:
+    try:
+        key: Any = json.loads(text)["fit"]
+    except (ValueError, RecursionError, KeyError, TypeError):
+        key = None
+    if not isinstance(key, str):
+        raise BadInput('a model is chosen by {"fit": "fit-1"}, and by {"fit": ""} the one that the rig came with.')
+    return key
 
 
 def _operates(hub: Hub, who: str) -> None:

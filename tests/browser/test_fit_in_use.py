@@ -1,0 +1,185 @@
+"""Does a fit of the bench become the model of its rig, with a law of its own, and does what is not trusted stay out?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import upright as up
+from tests.browser.runs import ByHand, twin
+from tests.browser.students import Server, student
+from tests.browser.test_fits import ask
+from tests.browser.test_page import tab_to
+from tests.browser.test_served import client
+from upright.basis import RESERVED, TRUSTED
+from upright.browser.identify.fits import COLUMNS, OWN
+from upright.browser.identify.fitted import fitted_rig
+from upright.browser.rig import HARDWARE, known_rig
+from upright.browser.serve import Bench
+from upright.errors import BadInput
+from upright.rig.makes import make_rig
+from upright.running.rig import model_and_truth
+from upright.study.stored_fit import FORMAT
+
+DESIGN = 120
+"""Seconds that a law may take on a loaded machine."""
+TRUE = make_rig("furuta", 3)
+"""Which the fits of these tests are of: its numbers are not those of the design."""
+
+
+def written_fit(folder: Path, key: str, *, trusted: bool = True, of: str = OWN) -> Path:
+    """A fit as the bench keeps it, with the numbers of a rig that is known."""
+    place = folder / "fits" / key
+    place.mkdir(parents=True)
+    numbers = {**TRUE.plant.parameters(), "actuator.gain": TRUE.gain}
+    content = {
+        "format": FORMAT, "plant": "furuta", "trusted": trusted, "rig": TRUE.hardware.plain(),
+        "verdict": "Rely on this model." if trusted else "It explains 12 % of theta.",
+        "parameters": {
+            n: {"value": v, "stderr": 0.01 * abs(v), "unit": "(N m)/V" if n == "actuator.gain" else "",
+                "status": "well determined"}
+            for n, v in numbers.items()
+        },
+        "estimated": list(numbers), "correlation": np.eye(len(numbers)).tolist(),
+    }  # fmt: skip
+    facts = {"verdict": content["verdict"], "sound": trusted, "interrupted": False, "plant": "furuta"} | {
+        name: [] for name in ("warnings", "windows", "rests", "assessments", "assumed", "parameters", "curves")
+    }
+    about = {"id": key, "log": "run", "of": of, "name": "run of yesterday", "since": 1.8e9, "verdict": "a verdict"}
+    for name, values in (("fit.json", content), ("facts.json", facts), (f"{key}.json", about)):
+        (place / name).write_text(json.dumps(values), encoding="utf-8")
+    return place / "fit.json"
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    return twin(tmp_path_factory.mktemp("bench"))
+
+
+@pytest.fixture
+def served(rig, tmp_path):
+    carry = ByHand()
+    with Bench([rig], tmp_path, carry=carry, report=lambda *_: "") as bench, client(bench) as page:
+        yield bench, page, carry, tmp_path / "furuta"
+        if not bench.stations[0].over:
+            carry.end()
+
+
+def use(bench, me, fit):
+    return ask(bench, "api/rigs/furuta/model", me, data=json.dumps({"fit": fit}).encode(), wait=DESIGN)[::2]
+
+
+@pytest.mark.slow
+def test_a_fit_gives_the_law_that_upright_design_gives_and_the_twin_stays_what_it_is(served, rig):
+    bench, page, _, folder = served
+    fit = written_fit(folder, "fit-1")
+    nominal, truth = page.scene, model_and_truth(rig.file)[1]
+    assert nominal["model"] == {"fit": "", "of": ""}
+    assert use(bench, page.me, "fit-1") == (200, "{}")
+    scene = page.note("scene", model={"fit": "fit-1", "of": "run of yesterday"})
+    assert scene["K"] == pytest.approx(up.design(fit, at="inverted").K[0].tolist(), rel=1e-6)
+    assert np.abs(np.array(scene["K"]) / nominal["K"] - 1).max() > 0.1
+    assert (scene["name"], scene["basis"]["level"]) == ("furuta", TRUSTED)
+    station = bench.stations[0]
+    model, still = model_and_truth(station.rig.file)
+    assert (still.plant, still.gain) == (truth.plant, truth.gain)
+    assert model.plant.J_p == pytest.approx(TRUE.plant.J_p)
+    assert station.rig.model.draws  # from which the rigs of the screen Design are drawn
+    assert use(bench, page.me, "")[0] == 200
+    assert page.note("scene", model={"fit": "", "of": ""})["K"] == nominal["K"]
+
+
+def test_what_is_not_trusted_or_of_another_rig_is_refused_and_nothing_changes(served):
+    bench, page, carry, folder = served
+    for key, how in (("fit-1", {"trusted": False}), ("fit-2", {"of": COLUMNS}), ("fit-3", {})):
+        written_fit(folder, key, **how)
+    before = bench.stations[0].rig
+    for key, why in (
+        ("fit-1", "not trusted. The fit's own verdict: It explains 12 % of theta"), ("fit-2", "columns tell"),
+        ("fit-9", "no such fit"), ("../fit-1", "no such fit"),
+    ):  # fmt: skip
+        status, text = use(bench, page.me, key)
+        assert (status, why in text) == (400, True), text
+    for body in (b"", b"[]", b'{"fit": 1}', b"nonsense"):
+        assert '{"fit": "fit-1"}' in ask(bench, "api/rigs/furuta/model", page.me, data=body)[2]
+    assert "for the page of this bench" in use(bench, "nobody", "fit-3")[1]
+    page.ask("operate")
+    with client(bench) as another:
+        assert use(bench, another.me, "fit-3") == (400, "Somebody else operates it.")
+    page.ask("start")
+    carry.go()
+    page.note("state", state="running")
+    assert "runs; stop it first" in use(bench, page.me, "fit-3")[1]
+    assert bench.stations[0].rig is before
+
+
+REAL = """kind = "serial"
+port = "/dev/ttyACM0"
+name = "furuta"
+fit = "first.json"
+[limits]
+command = "3 V"
+lean = "20 deg"
+[limits.psi]
+travel = "1.5 rad"
+speed = "20 rad/s"
+start = "0.3 rad"
+"""
+
+
+@pytest.mark.slow
+def test_a_rig_that_can_really_move_keeps_its_limits_and_its_port(tmp_path):
+    written_fit(tmp_path, "first").rename(tmp_path / "first.json")
+    path, law = tmp_path / "RIG.toml", twin(tmp_path / "law").law_path
+    path.write_text(REAL, encoding="utf-8")
+    nominal = known_rig(path, law, tmp_path)
+    rig = fitted_rig(nominal, written_fit(tmp_path, "fit-1"), "a run")
+    units = {c.name: c.unit for c in rig.model.plant.coordinates}
+    assert (rig.kind, rig.file.port, rig.lean) == (HARDWARE, "/dev/ttyACM0", nominal.lean)
+    assert rig.file.limits(units, "V") == nominal.file.limits(units, "V")
+    assert (nominal.basis.level, rig.basis.level) == (RESERVED, TRUSTED)  # the other law was of no fit
+
+
+def test_a_twin_of_its_own_description_is_refused_another_one(tmp_path):
+    written_fit(tmp_path, "first").rename(tmp_path / "first.json")
+    path, law = tmp_path / "RIG.toml", twin(tmp_path / "law").law_path
+    path.write_text('kind = "twin"\nname = "furuta"\nfit = "first.json"\n', encoding="utf-8")
+    with pytest.raises(BadInput, match='make = "furuta"'):
+        fitted_rig(known_rig(path, law, tmp_path), written_fit(tmp_path, "fit-1"), "a run")
+
+
+@pytest.mark.slow
+def test_a_student_takes_a_fit_into_use_by_keyboard_and_goes_back(chromium, tmp_path):
+    written_fit(tmp_path / "furuta", "fit-1")
+    server = Server(tmp_path)
+    try:
+        with student(chromium, server, screen="identify") as one, student(chromium, server) as another:
+            page = one.page
+            page.wait_for_selector("#fit-result:not([hidden])")
+            one.reads("#identify .in-use", "nominal model")
+            tab_to(page, "#fit-use")
+            page.keyboard.press("Enter")
+            one.reads("#identify .in-use", "fit of run of yesterday")
+            another.reads("#run .in-use", "fit of run of yesterday")
+            page.wait_for_selector("#tab-design:not([hidden])")
+            page.click("#tab-design")
+            one.reads("#lanes", "200 rigs that the fit of run of yesterday allows")
+            one.reads("#share", "200 of 200 rigs are stabilised")
+            one.reads("#gate-badge", "^trusted")
+            one.starts()
+            page.click("#tab-identify")
+            one.presses("#nominal")
+            one.reads("#message", "stop it first")
+            page.click("#end")
+            one.sees("ended")
+            tab_to(page, "#nominal")
+            page.keyboard.press("Enter")
+            one.reads("#identify .in-use", "nominal model")
+            another.reads("#run .in-use", "nominal model")
+            one.leaves()
+            assert one.wrong == another.wrong == []
+    finally:
+        server.close()
