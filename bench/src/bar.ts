@@ -51,7 +51,7 @@ export class Bar {
     badge.className = `badge ${scene.kind.toLowerCase()}`;
     say(badge, scene.kind);
     byId("tap").hidden = scene.kind !== "TWIN";
-    byId("from").hidden = scene.kind !== "TWIN" || Math.abs(scene.point.at(-1)! - Math.PI) > 1e-6;
+    byId("from").hidden = byId("record-motions").hidden = scene.kind !== "TWIN" || Math.abs(scene.point.at(-1)! - Math.PI) > 1e-6;
     say(byId("rate"), `at ${significant(1 / scene.period / (scene.period < 1e-3 ? 1000 : 1), 3)} ${scene.period < 1e-3 ? "kHz" : "Hz"}`);
     document.title = `${scene.title}: bench`;
   }

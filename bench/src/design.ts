@@ -8,7 +8,7 @@ import { type Group, LEAST, MOST_RATIO, characteristic, grouped, noise, polesOf,
 import { Regulator, branches, prices } from "./regulator";
 import type { Session } from "./session";
 import { about, drawStrip, limited } from "./strip";
-import { DEGREE, modelName, short, shownUnit, signed, significant, symbol } from "./words";
+import { DEGREE, OTHERS, modelName, short, shownUnit, signed, significant, symbol } from "./words";
 
 const ORDER: Fate[] = ["stands", "saturates", "falls"];
 const NAME: Record<Fate, string> = { stands: "stabilised", saturates: "stabilised with saturation", falls: "lost" };
@@ -250,8 +250,7 @@ export class Design {
     if (!scene || this.share === undefined) return;
     const few = this.share < ENOUGH, { level, sentence } = scene.basis;
     const idle = this.session.state?.state !== "running" ? "Start the rig to apply: gains are changed while it runs." : "";
-    const from = this.session.state?.from ?? "held", what = from === "hanging" ? "A swing-up runs, whose" : "First motions run, whose";
-    const swing = from === "held" ? "" : `${what} poles stay as they are. Start held upright to change them.`;
+    const from = this.session.state?.from ?? "held", swing = from === "held" ? "" : `While ${OTHERS[from]}, poles stay as they are. Start held upright to change them.`;
     const why = unsteerable || idle || swing || (few ? "Apply is locked: fewer than 95 % of the rigs are stabilised. Slow the fast poles down, or give them more damping." : "");
     badge.className = `badge ${few || level === "not trusted" ? "no" : level === "trusted" ? "ok" : "care"}`;
     say(badge, few ? "not supported" : level);

@@ -4,6 +4,7 @@ import { lock } from "./bar";
 import { drawChart } from "./chart";
 import { type Curve, drawCurves } from "./curves";
 import { byId, italic, make, say } from "./dom";
+import { Recording } from "./recording";
 import type { Session } from "./session";
 import { short, shownUnit, signed, symbol } from "./words";
 
@@ -87,10 +88,14 @@ export class Identify {
   private wanted = "";
   private timer = 0;
   private busy = "";
+  private readonly recording: Recording;
+  /** Whether a recording is shown, and not a fit; undefined until it is known whether there is one. */
+  private recorded: boolean | undefined;
 
   /** `chosen`: another fit is shown. */
   constructor(private readonly session: Session, record: () => void, private readonly chosen: () => void) {
     this.address = `/api/rigs/${encodeURIComponent(session.name)}`;
+    this.recording = new Recording(this.address, `/rigs/${encodeURIComponent(session.name)}/runs`);
     const press = (id: string, act: () => void) =>
       byId(id).addEventListener("click", ({ currentTarget }) => {
         const why = (currentTarget as HTMLElement).dataset["why"];
@@ -101,19 +106,26 @@ export class Identify {
     press("fit-interrupt", () => void this.order("DELETE", "fits"));
     press("fit-report", () => this.report());
     press("fit-motions", record);
+    for (const from of ["sweep", "step"] as const) press(`record-${from}`, () => session.steer({ do: "start", from }));
     press("fit-again", () => void this.again());
     byId("fit-log").addEventListener("change", () => this.about());
     byId("fit-file").addEventListener("change", ({ currentTarget }) => {
       const input = currentTarget as HTMLInputElement, file = input.files?.[0];
       if (file) void this.bring(file).finally(() => (input.value = ""));
     });
-    byId("fit-list").addEventListener("change", () => void this.open(byId<HTMLSelectElement>("fit-list").value));
+    byId("fit-list").addEventListener("change", () => {
+      this.recorded = false;
+      void this.open(byId<HTMLSelectElement>("fit-list").value);
+    });
     byId<HTMLIFrameElement>("fit-frame").addEventListener("load", ({ currentTarget }) => {
       (currentTarget as HTMLIFrameElement).contentWindow?.addEventListener("keydown", (event) => {
         if (event.key === "Escape") session.stop();
       }, { capture: true });
     });
-    const redraw = () => this.draw();
+    const redraw = () => {
+      this.draw();
+      this.recording.draw();
+    };
     addEventListener("resize", redraw);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   }
@@ -122,11 +134,20 @@ export class Identify {
     return !byId("identify").hidden;
   }
 
+  /** Whether a sweep or a step runs. */
+  private get records(): boolean {
+    const { state, from } = this.session.state ?? {};
+    return (from === "sweep" || from === "step") && (state === "starting" || state === "running");
+  }
+
   /** What is known now; again soon while a fit goes on, and now and then while the screen is looked at. */
   async show(): Promise<void> {
     clearTimeout(this.timer);
     const answer = await fetch(`${this.address}/fits`).catch(() => undefined);
     const before = this.identified;
+    if (this.records) this.recorded = true;
+    if (this.recorded === undefined) this.recorded = await this.recording.look();
+    else if (this.records || !this.recording.over) await this.recording.look();
     if (answer?.ok) {
       this.identified = (await answer.json()) as Identified;
       this.lists(before);
@@ -137,15 +158,15 @@ export class Identify {
     }
     this.state();
     clearTimeout(this.timer);
-    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now ? SOON : LATER);
+    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now || this.records || !this.recording.over ? SOON : LATER);
   }
 
   /** What may be pressed now. */
   state(): void {
     const { session, identified, busy } = this, now = identified?.now, chosen = byId<HTMLSelectElement>("fit-log").value;
     lock(byId("fit-begin"), session.unsteerable || busy || (now ? "A log is being identified." : chosen ? "" : "There is no log yet: record one, or bring one."));
-    byId("fit-record").hidden = byId("from").hidden;
-    lock(byId("fit-motions"), session.unsteerable || ({ stopped: "The rig is stopped; rearm it first.", starting: RUNS, running: RUNS } as Record<string, string>)[session.state?.state ?? ""] || "");
+    byId("fit-record").hidden = session.scene?.kind !== "TWIN";
+    for (const id of ["fit-motions", "record-sweep", "record-step"]) lock(byId(id), session.unsteerable || ({ stopped: "The rig is stopped; rearm it first.", starting: RUNS, running: RUNS } as Record<string, string>)[session.state?.state ?? ""] || "");
     byId("fit-interrupt").hidden = !now;
     byId("fit-begin").hidden = !!now;
     lock(byId("fit-interrupt"), session.unsteerable);
@@ -153,7 +174,8 @@ export class Identify {
     byId<HTMLInputElement>("fit-file").disabled = session.unsteerable !== "" || busy !== "";
     byId("fit-going").hidden = !now;
     byId("fit-live").hidden = !now || this.picture?.id !== now.id;
-    byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden;
+    byId("record-live").hidden = !this.recorded || !!now;
+    byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden || !byId("record-live").hidden;
     if (now) {
       say(byId("fit-step"), `${now.step}, ${now.seconds.toFixed(0)} s`);
       this.say(`Identifying ${now.name}.`);
@@ -164,9 +186,9 @@ export class Identify {
   private async look(): Promise<void> {
     const answer = await fetch(`${this.address}/fits/now`).catch(() => undefined);
     if (!answer?.ok) return;
-    const before = this.picture, picture = (this.picture = (await answer.json()) as Picture);
-    const last = picture.explained.at(-1);
-    if (!last) return;
+    const before = this.picture, picture = (await answer.json()) as Picture | null, last = picture?.explained.at(-1);
+    if (!picture || !last) return;
+    this.picture = picture;
     this.state();
     const shares = Object.entries(last[1]).map(([signal, percent]) => `${symbol(signal)} ${signed(percent, 0)} %`).join(", ");
     say(byId("fit-live-says"), `After ${last[0].toLocaleString("en-GB")} simulations the latest step explains ${shares}.`);
@@ -241,7 +263,9 @@ export class Identify {
   private async begin(): Promise<void> {
     const log = byId<HTMLSelectElement>("fit-log").value, own = byId("fit-kind").hidden;
     const of = own ? "rig" : byId<HTMLSelectElement>("fit-of").value;
-    if (await this.order("POST", "fits", JSON.stringify({ log, of }))) await this.show();
+    if (!(await this.order("POST", "fits", JSON.stringify({ log, of })))) return;
+    this.recorded = false;
+    await this.show();
   }
 
   /** The log of the fit that is shown once more, with what was measured meanwhile. */
@@ -317,6 +341,7 @@ export class Identify {
   /** Draws what could not be drawn while it was hidden. */
   opened(): void {
     this.draw();
+    this.recording.draw();
     void this.show();
   }
 

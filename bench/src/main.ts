@@ -85,7 +85,7 @@ async function bench(): Promise<void> {
       design?.gate();
       track.gate();
       if (identify.visible) {
-        if (before?.verdict !== state?.verdict) void identify.show();
+        if (before?.verdict !== state?.verdict || before?.state !== state?.state) void identify.show();
         else identify.state();
       }
     },

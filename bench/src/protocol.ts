@@ -56,7 +56,7 @@ export interface State {
   /** Why it cannot be swung up from where it hangs; "" where it can. */
   hanging: string;
   /** Where the run, or the last one, began. */
-  from: "held" | "hanging" | "motions";
+  from: "held" | "hanging" | "motions" | "sweep" | "step";
 }
 
 export type ServerMessage =

@@ -5,7 +5,7 @@ import { byId, field, make, say } from "./dom";
 import { type Figures, type Shape, type Wave, figures, linearAnswer, overshoot, valueAt, window } from "./following";
 import type { Session } from "./session";
 import { about, drawStrip, limited } from "./strip";
-import { short, shownUnit, significant, symbol } from "./words";
+import { OTHERS, short, shownUnit, significant, symbol } from "./words";
 
 const LONG = 0.1; // share of the time at the limit above which nothing is followed
 const SECONDS = 3, LONGEST = 10; // prediction of a step, period of a wave [s]
@@ -210,7 +210,7 @@ export class Track {
   gate(): void {
     const { scene, state, unsteerable } = this.session, badge = byId("track-badge");
     if (scene?.tracked === undefined) return;
-    const here = unsteerable || (state?.state !== "running" ? "Start the rig: a reference is followed while it runs." : state.from === "hanging" ? "A swing-up runs, which follows no reference. Start held to follow one." : state.from === "motions" ? "First motions run, which follow no reference. Start held to follow one." : "");
+    const here = unsteerable || (state?.state !== "running" ? "Start the rig: a reference is followed while it runs." : state.from === "held" ? "" : `While ${OTHERS[state.from]}, no reference is followed. Start held to follow one.`);
     badge.className = `badge ${this.outcome ? "no" : "ok"}`;
     say(badge, this.outcome ? "not supported" : "within limits");
     say(byId("track-gate"), this.outcome || here || "The model follows within its limits.");

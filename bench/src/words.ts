@@ -41,3 +41,8 @@ export function short(meaning: string): string {
 
 /** What a rig is known by. */
 export const modelName = ({ fit, of }: { fit: string; of: string }): string => (fit ? `fit of ${of}` : "nominal model");
+
+/** What runs that is no law which holds, by where it began. */
+export const OTHERS: Record<string, string> = {
+  hanging: "a swing-up runs", motions: "first motions run", sweep: "a sweep runs", step: "a step runs",
+};

@@ -163,6 +163,8 @@ def test_only_the_operator_at_a_page_of_this_bench_brings_and_identifies(bench):
             assert ask(bench, path, first.me, method, **{"Sec-Fetch-Site": "cross-site"})[0] == 403
         assert ask(bench, fits, first.me, "DELETE")[2] == "Nothing is being identified."
     assert json.loads(got(bench, fits)[2]) == {"logs": [], "now": None, "failed": "", "fits": []}
+    for path in ("fits/now", "recording"):
+        assert got(bench, f"api/rigs/furuta/{path}")[::2] == (200, "null")
 
 
 def test_what_is_no_request_for_a_fit_is_answered_by_one_that_is(bench):
@@ -194,7 +196,7 @@ def test_more_than_may_come_is_refused_before_it_comes(bench):
 def test_nothing_else_of_the_fits_answers(bench):
     for path in (
         "api/rigs/nobody/fits", "rigs/furuta/fits/fit-1.json", "rigs/furuta/fits/..%2f..%2ffuruta.toml",
-        "rigs/furuta/fits/fit-1.toml", "rigs/nobody/fits/fit-1.html", "api/rigs/furuta/fits/now",
-        "api/rigs/nobody/fits/now",
+        "rigs/furuta/fits/fit-1.toml", "rigs/nobody/fits/fit-1.html", "api/rigs/nobody/fits/now",
+        "api/rigs/nobody/recording",
     ):  # fmt: skip
         assert got(bench, path)[0] == 404

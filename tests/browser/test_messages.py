@@ -53,8 +53,8 @@ def test_anything_is_a_message_of_finite_numbers_or_a_sentence(text):
         ('{"do": "tap", "coordinate": "psi", "speed": true}', "is a number"),
         (f'{{"do": "reference", "value": 1{"0" * 400}}}', "value of 'reference'"),
         ('{"do": "poles", "poles": [[1, 2, 3]]}', "pairs"), ('{"do": "poles", "poles": [1]}', "a list"),
-        ('{"do": "start", "from": "above"}', "from of 'start' is 'held', 'hanging' or 'motions'"),
-        ('{"do": "start", "from": ["held"]}', "'held', 'hanging' or 'motions'"),
+        ('{"do": "start", "from": "above"}', "from of 'start' is one of held, hanging, motions, sweep, step"),
+        ('{"do": "start", "from": ["held"]}', "one of held, hanging, motions, sweep, step"),
         ('{"do": "start", "start": [' + "0," * 16 + "0]}", "at most 16"),
     ],
 )  # fmt: skip

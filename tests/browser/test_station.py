@@ -333,6 +333,28 @@ def test_first_motions_begin_where_the_rig_hangs_and_are_no_feedback_of_states(a
     assert made.described("operator")["from"] == "motions"
 
 
+@pytest.mark.parametrize("kind", ["sweep", "step"])
+def test_a_sweep_and_a_step_are_runs_that_stop_as_others_do(at_work, kind):
+    made, carry, _ = at_work
+    ask(made, "operator", "start", **{"from": kind})
+    carry.go()
+    order = carry.orders[0]
+    assert order.make().supervisor.duty.at == "hanging"
+    assert order.seconds == made.described("operator")["seconds"] == made.recording.request.seconds
+    with pytest.raises(BadInput, match=f"a {kind} runs"):
+        ask(made, "operator", "poles", poles=[-5.0, -6.0, -7.0, -8.0])
+    shown = made.recording
+    assert (shown.described()["kind"], shown.described()["over"]) == (kind, False)
+    ask(made, "a watcher", "stop")
+    assert made.desk.stopping
+    carry.end("Stopped by hand.")
+    assert settled(made, lambda m: m.over and m.recording.described()["over"])
+    assert made.recording is shown  # it is looked at until the next one
+    ask(made, "operator", "rearm")
+    ask(made, "operator", "start")
+    assert made.recording is shown
+
+
 def test_a_rig_that_has_no_first_motions_says_why(rig):
     with pytest.raises(BadInput, match="stands beside it"):
         first_motions(hardware(rig))

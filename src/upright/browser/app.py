@@ -264,6 +264,8 @@ def _result(folder: Path, name: str, path: str) -> Response:
     for run in listed(folder, name):
         if run.get("log") == path:
             return FileResponse(folder / f"{run['id']}.mcap", filename=f"{name}-{run['id']}.mcap")
+        if run.get("response") == path:
+            return FileResponse(folder / f"{run['id']}.frequency.csv", filename=f"{name}-{run['id']}.frequency.csv")
         if run.get("report") == path:
             return report_page(folder / f"{run['id']}.html")
     return nothing()

@@ -11,8 +11,9 @@ from typing import Any, NoReturn
 from upright.errors import BadInput, nearest
 from upright.realtime.reference import SHAPES
 
-HELD, HANGING, MOTIONS = "held", "hanging", "motions"
-"""Where a run begins: held; hanging, to be swung up; hanging, to be moved for its identification."""
+HELD, HANGING, MOTIONS, SWEEP, ONE_STEP = "held", "hanging", "motions", "sweep", "step"
+"""Where a run begins: held; hanging, to be swung up; at rest, to be identified in one of three ways."""
+ORIGINS = (HELD, HANGING, MOTIONS, SWEEP, ONE_STEP)
 LONGEST = 4096
 """Bytes of a message at most."""
 _STATES = 16
@@ -45,8 +46,8 @@ def _text(value: Any) -> str:
 
 
 def _where(value: Any) -> str:
-    if value not in (HELD, HANGING, MOTIONS):
-        raise ValueError(f"'{HELD}', '{HANGING}' or '{MOTIONS}'")
+    if value not in ORIGINS:
+        raise ValueError(f"one of {', '.join(ORIGINS)}")
     return str(value)
 
 

@@ -30,7 +30,8 @@ def write_report(run: PreparedRun, end: RunEnd, started: float) -> str:
     chapter = run_chapter(result)
     write_html(result.log_path.with_suffix(".html"), chapter)
     seconds = float(result.t[-1]) if result.t.size else 0.0
-    what = "first motions" if run.request.exploration else "swing-up" if run.request.from_rest else "run"
+    begun = "first motions" if run.request.exploration else "swing-up" if run.request.from_rest else "run"
+    what = run.request.what or begun
     facts = {"what": what, "started": started, "seconds": seconds, "verdict": chapter.verdict}
     replace_file(result.log_path.with_suffix(".json"), json.dumps(facts).encode())
     return chapter.verdict
@@ -50,7 +51,7 @@ def listed(folder: Path, name: str) -> list[dict[str, Any]]:
             facts: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             there = {
                 key: f"/rigs/{name}/runs/{path.stem}.{end}"
-                for key, end in (("log", "mcap"), ("report", "html"))
+                for key, end in (("log", "mcap"), ("report", "html"), ("response", "frequency.csv"))
                 if path.with_suffix(f".{end}").exists()
             }
             out.append({"id": path.stem, **facts, **there})

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from upright.basis import NOT_TRUSTED
 from upright.browser.hanging import first_motions, swing_up_apart
+from upright.browser.identify.recording import Recording
 from upright.browser.lease import Lease
-from upright.browser.messages import HANGING, HELD, MOTIONS, ClientRequest
+from upright.browser.messages import HANGING, HELD, MOTIONS, ONE_STEP, SWEEP, ClientRequest
 from upright.browser.rig import HARDWARE, TWIN, BenchRig
 from upright.browser.runs import report_apart
 from upright.errors import BadInput, UprightError, nearest
@@ -39,6 +40,11 @@ LONGEST, USUAL = 3600.0, 600.0
 TILT, ASIDE = math.radians(3.0), 0.003
 """How far a twin's hand lets go from what is held, where nobody says [rad, m]."""
 NOT_DESIGNED = "Its swing-up is being designed, which takes some seconds."
+OTHERS = {
+    HANGING: "a swing-up runs, which is", MOTIONS: "its first motions run, which are",
+    SWEEP: "a sweep runs, which is", ONE_STEP: "a step runs, which is",
+}  # fmt: skip
+"""What else runs than a law that holds, by where it began."""
 PERIODS = (0.2, 60.0)
 """Of a wave that is followed [s]."""
 FASTEST = 20.0
@@ -86,7 +92,9 @@ class Station:
     hanging : str
         Why it cannot be swung up from where it hangs, as a sentence; empty where it can.
     origin : str
-        Where the run, or the last one, began: `HELD`, `HANGING` for a swing-up, `MOTIONS` to be identified.
+        Where the run, or the last one, began: `HELD`, `HANGING` for a swing-up, `MOTIONS` to be identified, and so on.
+    recording : Recording or None
+        The last sweep or step.
     loop, requested : Loop or None
         The law that runs as state feedback, and the one that was asked for last; a swing-up is none.
     desk : RunDesk or None
@@ -115,6 +123,7 @@ class Station:
         self._lock, self._thread = threading.Lock(), None
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
         self._new_desk = desk
+        self.recording: Recording | None = None
 
     def beat(self) -> None:
         """Say that somebody can stop it; a run whose server does not answer any more ends by itself."""
@@ -179,8 +188,9 @@ class Station:
         if origin == HANGING and (why := self.hanging):
             self.prepare()
             raise BadInput(why)
-        if origin == MOTIONS:
-            request = first_motions(self.rig)
+        recording = Recording(self.rig, origin) if origin in (SWEEP, ONE_STEP) else None
+        if recording is not None or origin == MOTIONS:
+            request = first_motions(self.rig) if recording is None else recording.request
             seconds = request.seconds
         else:
             swings = origin == HANGING
@@ -194,10 +204,12 @@ class Station:
             self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
             self.origin = origin  # before the desk, by which a new scene is made
             self.last, self.desk = RunState(phase="starting"), desk
+            self.recording = recording or self.recording
             self.loop = self.rig.loop if origin == HELD else None
             self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
-        self._thread = threading.Thread(target=self._run, args=(request, desk), name=self.rig.name, daemon=True)
+        every = (request, desk, recording)
+        self._thread = threading.Thread(target=self._run, args=every, name=self.rig.name, daemon=True)
         self._thread.start()
 
     def stop(self, why: str) -> None:
@@ -256,8 +268,7 @@ class Station:
             raise BadInput(f"its model is not trusted: {self.rig.basis.sentence}")
         desk = self._running()
         if self.origin != HELD:
-            what = "a swing-up runs, which is" if self.origin == HANGING else "its first motions run, which are"
-            raise BadInput(f"{what} no feedback of states alone; its poles stay as they are.")
+            raise BadInput(f"{OTHERS[self.origin]} no feedback of states alone; its poles stay as they are.")
         loop = self.rig.with_poles(poles)
         if not desk.change(loop.law):
             raise BadInput("the last change is not answered yet.")
@@ -329,10 +340,13 @@ class Station:
             raise BadInput(f"a run starts within {math.degrees(NEAR):.3g} degrees of what is held.")
         return start[-2]
 
-    def _run(self, request: RunRequest, desk: RunDesk) -> None:
-        started = time.time()
+    def _run(self, request: RunRequest, desk: RunDesk, recording: Recording | None) -> None:
+        started, log = time.time(), None
         try:
             run = prepared(request, self.folder)
+            log = run.order.log
+            if recording is not None:
+                recording.begin(desk)
             order = replace(run.order, wall=True, fifo=self._fifo)
             end = self._carry(order, watch=self._watch, desk=desk)
         except UprightError as error:
@@ -341,6 +355,9 @@ class Station:
         except BaseException:
             self._ended("The run failed by a bug; see what the server printed.")
             raise
+        finally:
+            if recording is not None:
+                recording.end(log)
         why = self._ended(end.stopped, end)
         if end.stopped == BY_HAND:  # the loop does not know by whose
             end = replace(end, stopped=why or "Ended by its operator.")

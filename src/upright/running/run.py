@@ -55,6 +55,7 @@ class RunRequest:
     `accept` says why a law from a model that is not trusted runs on hardware all the same.
     `settled` says that the rig hangs as it was zeroed and known, so that it is neither zeroed nor awaited again.
     `steered` says that somebody gives the law references while it runs, so that each of them is logged.
+    `what` is what a list calls it, where its beginning does not say that.
     `own_process` puts a twin or a replay into a process of its own as well, where a rig always is.
     """
 
@@ -75,6 +76,7 @@ class RunRequest:
     accept: str | None = None
     settled: bool = False
     steered: bool = False
+    what: str = ""
     own_process: bool = False
 
     def __post_init__(self) -> None:

@@ -38,8 +38,14 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
 
     async def picture(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
-        now = None if own is None else own.picture()
-        return nothing() if now is None else JSONResponse(now)
+        return nothing() if own is None else JSONResponse(own.picture())
+
+    async def recorded(request: Request) -> Response:
+        hub = hubs.get(request.path_params["name"])
+        if hub is None:
+            return nothing()
+        recording = hub.station.recording
+        return JSONResponse(None if recording is None else await asyncio.to_thread(recording.described))
 
     async def written(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
@@ -95,6 +101,7 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         Route("/api/rigs/{name}/model", for_operator(adopt), methods=["POST"]),
         Route("/api/rigs/{name}/fits", described, methods=["GET"]),
         Route("/api/rigs/{name}/fits/now", picture, methods=["GET"]),
+        Route("/api/rigs/{name}/recording", recorded, methods=["GET"]),
         Route("/api/rigs/{name}/fits", for_operator(begin), methods=["POST"]),
         Route("/api/rigs/{name}/fits", for_operator(interrupt), methods=["DELETE"]),
         Route("/api/rigs/{name}/logs", for_operator(bring), methods=["POST"]),

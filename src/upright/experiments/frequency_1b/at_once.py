@@ -48,8 +48,8 @@ class Asking:
     wave: Array
 
 
-def asking(stand: TestStand) -> Asking:
-    """Of the rig as its owner describes it.
+def band_and_reach(stand: TestStand) -> tuple[tuple[float, float], Array]:
+    """Frequencies between which a rig is excited [rad/s], and the amplitudes that are wanted there [m or rad].
 
     Raises
     ------
@@ -59,7 +59,7 @@ def asking(stand: TestStand) -> Asking:
     model, at = stand.rig, stand.resting
     linear = model.linear(at)
     if stand.make is not None:
-        band, reach = stand.make.band, np.array(stand.make.reach)
+        (low, high), reach = stand.make.band, np.array(stand.make.reach)
     else:
         swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
         if not swings:
@@ -67,10 +67,23 @@ def asking(stand: TestStand) -> Asking:
                 f"{model.name} does not swing about '{at}', and the band of its excitation follows from its "
                 "swings; log a step of it instead (upright run --excite), and fit that (upright identify)."
             )
-        band = (BELOW * min(swings), ABOVE * max(swings))
+        low, high = BELOW * min(swings), ABOVE * max(swings)
         reach = np.array([REACH[c.unit] for c in model.plant.coordinates])
     driven = stand.names.index(model.plant.inputs[0].on)
     reach[driven] = min(reach[driven], OF_TRAVEL * stand.travel)
+    return (low, high), reach
+
+
+def asking(stand: TestStand) -> Asking:
+    """Of the rig as its owner describes it.
+
+    Raises
+    ------
+    BadInput
+        When it does not swing where it rests.
+    """
+    model, linear = stand.rig, stand.rig.linear(stand.resting)
+    band, reach = band_and_reach(stand)
     length = 64 * math.ceil(RESOLVED * 2 * math.pi / (64 * band[0] * model.period))
     base = 2 * math.pi / (length * model.period)
     lines = odd_lines(*band, LINES, base)

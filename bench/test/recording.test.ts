@@ -1,0 +1,14 @@
+import { expect, test } from "vitest";
+import { stepped, within } from "../src/recording";
+
+test("an axis holds every value in whole steps, and is never without height", () => {
+  expect(stepped([-170, -20], 90)).toEqual({ low: -180, high: 0, at: [-180, -90, 0] });
+  expect(stepped([0, 0], 20)).toMatchObject({ low: 0, high: 20 });
+  expect(stepped([-39, 19.5], 20, 1)).toMatchObject({ low: -40, high: 40 });
+});
+
+test("a value has the digits that half the width of its interval leaves", () => {
+  expect(within(7.3566, 0.106)).toBe("7.36 ± 0.11");
+  expect(within(-165.25, 6.2)).toBe("\u2212165.3 ± 6.2");
+  expect(within(-31.8, 51)).toBe("\u221232 ± 51");
+});

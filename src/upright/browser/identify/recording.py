@@ -1,0 +1,192 @@
+"""A sweep or a step that a rig records: what is put out, and what it has shown so far, as the page draws it.
+
+The run is one of the rig's loop like any other; its samples are read beside it, as everybody's who looks on are.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from upright.browser.messages import SWEEP
+from upright.browser.rig import HARDWARE, BenchRig
+from upright.errors import BadInput
+from upright.experiments.frequency_1b.one_by_one import (
+    Sine,
+    SteppedSines,
+    modelled,
+    response_of_sines,
+    sine,
+    stepped_sines,
+)
+from upright.experiments.stand.live import live_stand
+from upright.experiments.stand.step import StepSignal, modes, predicted_step, reading, step_signal
+from upright.records import Array
+from upright.report.drawing import decimated
+from upright.running.run import RunRequest
+from upright.signals.free_swing import Decay
+
+OFTEN = 0.25
+"""Time between two looks at the samples [s]; the loop keeps them for some two seconds."""
+LINE, BUCKETS, NORMAL = 150, 200, 1.96
+"""Frequencies of the model's line, points of a trace, and standard errors in an error bar."""
+
+Facts = dict[str, Any]
+
+
+class Samples(Protocol):
+    """What a recording needs of a run's desk."""
+
+    def since(self, number: int) -> tuple[int, NDArray[np.void]]: ...  # noqa: D102
+
+
+class Recording:
+    """A sweep or a step of a twin.
+
+    Attributes
+    ----------
+    request : RunRequest
+        The run that it is.
+
+    Raises
+    ------
+    BadInput
+        When the rig can really move, or has no such response.
+    """
+
+    def __init__(self, rig: BenchRig, kind: str) -> None:
+        if rig.kind == HARDWARE:
+            raise BadInput(
+                "a rig that can really move is moved by somebody who stands beside it: upright lab --rig RIG.toml "
+                "--experiment 1b, or upright run RIG.toml --excite."
+            )
+        stand = live_stand(rig.rig_path)
+        self.kind, self._rig, self._at = kind, stand.rig, stand.resting
+        self._plan: SteppedSines | StepSignal = stepped_sines(stand) if kind == SWEEP else step_signal(stand)
+        size = self._plan.samples.size
+        self.request = RunRequest(
+            rig=rig.rig_path, samples=tuple(self._plan.samples.tolist()), seconds=self._plan.seconds, check=False,
+            watch=False, what=kind,
+        )  # fmt: skip
+        self._y, self._u = np.full((size, len(stand.names)), np.nan), np.full(size, np.nan)
+        self._line: Facts = {}
+        self._next, self._came, self._tried = 0, 0, 0
+        self._sines: list[Sine] = []
+        self._reading: Decay | None = None
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._run, self._thread = "", None
+
+    def begin(self, desk: Samples) -> None:
+        """Read what a run shows, until it is over."""
+        self._thread = threading.Thread(target=self._follow, args=(desk,), name="recording", daemon=True)
+        self._thread.start()
+
+    def end(self, log: Path | None = None) -> None:
+        """The run is over; the response is stored beside its log."""
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
+        with self._lock:
+            self._run = "" if log is None else log.stem
+            if log is not None and self._sines:
+                response_of_sines(self._sines, self._rig).to_csv(log.with_suffix(".frequency.csv"))
+
+    def described(self) -> Facts:
+        """What there is so far, as JSON holds it."""
+        with self._lock:
+            sines, came, decayed, run = list(self._sines), self._came, self._reading, self._run
+        rig, plan = self._rig, self._plan
+        facts = {
+            "kind": self.kind, "over": self._over.is_set(), "run": run, "command": rig.unit,
+            "seconds": plan.seconds, "time": came * plan.period,
+            "outputs": [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in rig.plant.coordinates],
+            **self._line,
+        }  # fmt: skip
+        if not self._line:
+            return facts
+        if isinstance(plan, SteppedSines):
+            return {**facts, "planned": plan.omega.tolist(), "points": self._points(sines)}
+        t = np.arange(came, dtype=np.float64) * plan.period
+        read = None if decayed is None else {
+            "omega": decayed.omega_n, "omega_error": NORMAL * decayed.omega_error, "zeta": decayed.zeta,
+            "zeta_error": NORMAL * decayed.sigma_error / decayed.omega_n,
+        }  # fmt: skip
+        return {**facts, "measured": [_thinned(t, y) for y in self._y[:came].T], "reading": read}
+
+    def _model(self) -> Facts:
+        """What the rig as it is known would show."""
+        rig, at, plan = self._rig, self._at, self._plan
+        if isinstance(plan, SteppedSines):
+            omega = np.geomspace(plan.omega[0] / 1.2, plan.omega[-1] * 1.2, LINE)
+            response = modelled(rig, at, omega)
+            angle = np.degrees(np.unwrap(np.angle(response), axis=0))
+            angle -= 360 * np.round((np.median(angle, axis=0) + 90) / 360)
+            return {"line": {"omega": _short(omega), "dB": [_short(v) for v in 20 * np.log10(np.abs(response)).T],
+                             "deg": [_short(v) for v in angle.T]}}  # fmt: skip
+        t = np.arange(plan.samples.size, dtype=np.float64) * plan.period
+        return {"predicted": [_thinned(t, y) for y in predicted_step(plan, rig, at).T],
+                "modes": {name: list(values) for name, values in modes(rig, at).items()}}  # fmt: skip
+
+    def _points(self, sines: Sequence[Sine]) -> list[Facts]:
+        """Gain [dB] and phase [deg] of each sine that was measured, with the half widths of their 95 % intervals."""
+        if not sines:
+            return []
+        data, line = response_of_sines(list(sines), self._rig), self._line["line"]
+        model = np.array([np.interp(np.log(data.omega), np.log(line["omega"]), deg) for deg in line["deg"]]).T
+        angle = np.degrees(np.angle(data.response))
+        angle += 360 * np.round((model - angle) / 360)
+        return [
+            {"omega": float(data.omega[k]), "dB": _short(data.magnitude_dB[k]), "deg": _short(angle[k]),
+             "dB_error": _short(NORMAL * 20 / math.log(10) * data.error[k]),
+             "deg_error": _short(NORMAL * np.degrees(data.error[k])), "settled": s.settled}
+            for k, s in enumerate(sines)
+        ]  # fmt: skip
+
+    def _follow(self, desk: Samples) -> None:
+        self._line = self._model()  # which compiles, and the loop is not there yet
+        over = False
+        while not over:
+            over = self._over.wait(OFTEN)
+            self._take(desk)
+
+    def _take(self, desk: Samples) -> None:
+        self._next, rows = desk.since(self._next)
+        rows = rows[rows["number"] < self._u.size]
+        if not len(rows):
+            return
+        at, n = rows["number"], self._y.shape[1]
+        self._y[at] = rows["counts"][:, :n] / np.abs(np.array(self._rig.per_unit))
+        self._u[at] = rows["applied"]
+        came = int(at[-1]) + 1
+        if isinstance(self._plan, SteppedSines):
+            self._measure(self._plan, came)
+        else:
+            decayed = reading(self._plan, self._rig, self._y[:came]) if np.isfinite(self._y[:came]).all() else None
+            with self._lock:
+                self._reading = decayed
+        with self._lock:
+            self._came = came
+
+    def _measure(self, plan: SteppedSines, came: int) -> None:
+        while self._tried < len(plan.windows) and plan.windows[self._tried][1] <= came:
+            part = slice(*plan.windows[self._tried])
+            if np.isfinite(self._u[part]).all():  # else this machine was too slow to read them in time
+                measured = sine(plan, self._tried, self._rig, self._y[part], self._u[part])
+                with self._lock:
+                    self._sines.append(measured)
+            self._tried += 1
+
+
+def _short(values: Array) -> list[float]:
+    return [float(f"{v:.5g}") for v in values.tolist()]
+
+
+def _thinned(t: Array, y: Array) -> list[list[float | None]]:
+    times, values = decimated(t, y, BUCKETS)
+    return [[float(f"{v:.5g}") if math.isfinite(v) else None for v in column] for column in (times, values)]

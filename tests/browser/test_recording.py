@@ -1,0 +1,102 @@
+"""Does a recording show what a Fourier transform makes of the same samples, and nothing of what it did not see?"""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+import pytest
+
+from tests.browser.runs import SOON, hardware, twin
+from upright.browser.identify.recording import Recording
+from upright.browser.messages import ONE_STEP, SWEEP
+from upright.errors import BadInput
+from upright.experiments.frequency_1b.one_by_one import stepped_sines
+from upright.experiments.stand.live import live_stand
+from upright.experiments.stand.twin import TwinStand
+from upright.identification.frequency.response import FrequencyResponse
+from upright.realtime.desk import ROW, ROWS
+from upright.rig.makes import make_rig
+
+
+class Played:
+    """Stands for the desk of a run: rows of a twin in virtual time, at most half a ring of them at a look."""
+
+    def __init__(self, y, u, per_unit, lost=()):
+        self.rows = np.zeros(len(u), dtype=ROW)
+        self.rows["number"] = self.rows["again"] = np.arange(len(u))
+        self.rows["counts"][:, : y.shape[1]] = np.round(y * np.abs(per_unit))
+        self.rows["applied"], self.lost, self.over = u, lost, threading.Event()
+
+    def since(self, number):
+        head = min(number + ROWS // 2, len(self.rows))
+        if head == len(self.rows):
+            self.over.set()
+        numbers = np.arange(number, head)
+        return head, self.rows[number:head][~np.isin(numbers, self.lost)]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    return twin(tmp_path_factory.mktemp("bench"))
+
+
+def played(rig, kind, folder, monkeypatch, lost=()):
+    monkeypatch.setattr("upright.browser.identify.recording.OFTEN", 1e-4)
+    recording = Recording(rig, kind)
+    model, samples = make_rig("furuta", 3), recording.request.samples
+    record = TwinStand(rig=model).run(list(samples), folder, "played")
+    y, u = np.column_stack([record["psi"], record["theta"]]), record["u_applied"]
+    desk = Played(y, u, model.per_unit, lost)
+    recording.begin(desk)
+    assert desk.over.wait(12 * SOON)
+    recording.end(folder / "run.mcap")
+    return recording.described(), y, u
+
+
+def test_of_a_sweep_each_point_is_the_line_of_a_fourier_transform_and_what_was_lost_leaves_the_others(
+    rig, tmp_path, monkeypatch
+):
+    drawn, y, u = played(rig, SWEEP, tmp_path, monkeypatch, lost=[70_000])
+    assert (drawn["over"], drawn["run"], drawn["kind"]) == (True, "run", "sweep")
+    assert len(drawn["points"]) == len(drawn["planned"]) - 1
+    missed = set(drawn["planned"]) - {p["omega"] for p in drawn["points"]}
+    plan = stepped_sines(live_stand(rig.rig_path))
+    windows = dict(zip(plan.omega.tolist(), plan.windows, strict=True))
+    for point in drawn["points"]:
+        part = slice(*windows[point["omega"]])
+        k = round((part.stop - part.start) * rig.model.period * point["omega"] / (2 * math.pi))  # whole periods in it
+        samples = np.arange(part.stop - part.start)
+        means, middles = (z.reshape(k, samples.size // k, -1).mean(axis=1) for z in (y[part], samples))
+        slope, level = np.polyfit(middles[:, 0], means, 1)  # of what every sine has none
+        flat = y[part] - slope * samples[:, None] - level
+        answer = np.fft.rfft(flat, axis=0)[k] / np.fft.rfft(u[part])[k]
+        off = np.abs(20 * np.log10(np.abs(answer)) - point["dB"])
+        assert np.all(off < 0.05 + np.array(point["dB_error"])), point["omega"]
+        turned = np.abs((np.degrees(np.angle(answer)) - point["deg"] + 180) % 360 - 180)
+        assert np.all(turned < 0.5 + np.array(point["deg_error"])), point["omega"]
+    stored = FrequencyResponse.from_csv(tmp_path / "run.frequency.csv")
+    assert stored.omega == pytest.approx([p["omega"] for p in drawn["points"]])
+    assert stored.magnitude_dB == pytest.approx(np.array([p["dB"] for p in drawn["points"]]), abs=1e-3)
+    assert len(missed) == 1
+
+
+def test_of_a_step_everything_is_drawn_beside_what_the_model_would_show_and_its_swing_is_read(
+    rig, tmp_path, monkeypatch
+):
+    drawn, y, _ = played(rig, ONE_STEP, tmp_path, monkeypatch)
+    assert drawn["time"] == pytest.approx(drawn["seconds"], abs=0.01)
+    for (t, shown), true in zip(drawn["measured"], y.T, strict=True):
+        at = np.round(np.array(t) / rig.model.period).astype(int)
+        assert np.abs(true[at] - shown).max() <= 1.01 / min(map(abs, rig.model.per_unit))
+    low, high = sorted(omega for omega, _ in drawn["modes"].values())
+    assert low == drawn["modes"]["held"][0]
+    assert 0.95 * low < drawn["reading"]["omega"] < 1.02 * high
+    assert list(tmp_path.glob("*.frequency.csv")) == []
+
+
+def test_a_rig_that_can_really_move_is_recorded_by_somebody_beside_it(rig):
+    for kind in (SWEEP, ONE_STEP):
+        with pytest.raises(BadInput, match="upright lab"):
+            Recording(hardware(rig), kind)
