@@ -45,6 +45,10 @@ class Normal:
         return normal if math.isfinite(normal.cost) and finite(normal.matrix) else cls.lost(x.size)
 
 
+BLOCK = 1024
+"""Samples whose lanes stay near the processor."""
+
+
 def finite(values: Array) -> bool:
     """Whether all values are finite, tested by their sum: one pass without a temporary."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -88,20 +92,27 @@ def squares(lanes: Sequence[Array], target: Array, offset: Array, W: Array, scal
     -----
     In blocks small enough to stay near the processor.
     """
-    blocks = np.zeros((len(lanes), 512, offset.shape[1]))
-    total = np.zeros((offset.shape[1],) * 2)
-    weighed = [int(k) for k in np.flatnonzero(np.any(W, axis=0))]
+    lengths = len(lanes), BLOCK, offset.shape[1]
+    blocks, mixed, total = np.empty(lengths), np.empty(lengths[1:]), np.zeros((lengths[2],) * 2)
+    rows = [[(int(k), float(row[k])) for k in np.flatnonzero(row)] for row in W if row.any()]
+    scaled = {k: scale is not None and bool((scale[k] != 1.0).any()) for row in rows for k, _ in row}
     with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the sum infinite
-        for first in range(0, target.shape[0], blocks.shape[1]):
-            here = slice(first, first + blocks.shape[1])
+        for first in range(0, target.shape[0], BLOCK):
+            here = slice(first, first + BLOCK)
             B = blocks[:, : target[here].shape[0]]
-            for k in weighed:
-                z = lanes[k][here] if scale is None else np.multiply(lanes[k][here], scale[k], out=B[k])
-                np.add(z, offset[k], out=B[k])
-                B[k, :, 1:] -= B[k, :, :1]
-                B[k, :, 0] -= target[here, k]
-            for row in W[np.any(W, axis=1)]:
-                together = np.tensordot(row, B, axes=1)
+            for k, own in scaled.items():
+                z = lanes[k][here]
+                if own and scale is not None:
+                    z = np.multiply(z, scale[k], out=B[k])
+                if offset[k].any():
+                    z = np.add(z, offset[k], out=B[k])
+                unmoved = z[:, :1].copy()
+                np.subtract(z[:, 1:], unmoved, out=B[k, :, 1:])
+                np.subtract(unmoved[:, 0], target[here, k], out=B[k, :, 0])
+            for (k, weight), *others in rows:
+                together = np.multiply(B[k], weight, out=mixed[: B.shape[1]])
+                for other, its in others:
+                    together += its * B[other]
                 total += together.T @ together
     return total if finite(total) else np.full_like(total, math.inf)
 
