@@ -5,7 +5,6 @@ Order, threshold and decimation of each are those that simulate the end of what 
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections.abc import Callable
 from itertools import product
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
-from benchmarks.peers.task import Answer, Samples, Task, fit_percent
+from benchmarks.peers.task import Answer, Samples, Task, fit_percent, spent
 
 Array = NDArray[np.float64]
 
@@ -35,14 +34,19 @@ def _tail(run: Samples) -> Samples:
 
 
 def _arx(run: Samples, order: int) -> Array:
-    rows = [np.append(run.y[k - order : k].ravel(), 1.0) for k in range(order, run.t.size)]
+    rows = [_past(run.y, run.u, k, order) for k in range(order, run.t.size)]
     return np.linalg.lstsq(np.array(rows), run.y[order:], rcond=None)[0]
+
+
+def _past(y: Array, u: Array, k: int, order: int) -> Array:
+    """What sample k is computed from; a command that is always zero weighs nothing."""
+    return np.concatenate([y[k - order : k].ravel(), u[k - order : k], [1.0]])
 
 
 def _arx_run(weights: Array, run: Samples, order: int) -> Array:
     out = run.y.copy()
     for k in range(order, run.t.size):
-        out[k] = np.clip(np.append(out[k - order : k].ravel(), 1.0) @ weights, -LARGEST, LARGEST)
+        out[k] = np.clip(_past(out, run.u, k, order) @ weights, -LARGEST, LARGEST)
     return out
 
 
@@ -51,8 +55,8 @@ def _score(run: Samples, predicted: Array) -> float:
 
 
 def arx(task: Task) -> Answer:
-    """A linear equation of the past samples."""
-    begin = time.perf_counter()
+    """A linear equation of the past samples and commands."""
+    begin = spent()
     best: tuple[float, int, int] | None = None
     for step, order in product(DECIMATIONS, ORDERS):
         run = _coarser(task.fitted, step)
@@ -64,7 +68,7 @@ def arx(task: Task) -> Answer:
     assert best is not None
     _, step, order = best
     weights = _arx(_coarser(task.fitted, step), order)
-    taken = time.perf_counter() - begin
+    taken = spent() - begin
     return Answer(predicted=_each(task, step, lambda run: _arx_run(weights, run, order)), seconds=taken)
 
 
@@ -113,7 +117,7 @@ def sindy(task: Task) -> Answer:
     """Accelerations as a sparse sum of a pendulum's terms; the sensor's zero is not estimated."""
     import pysindy
 
-    begin = time.perf_counter()
+    begin = spent()
     step = max(1, round(0.005 / float(task.fitted.t[1] - task.fitted.t[0])))
     run = _coarser(task.fitted, step)
     states, push = _states(run)
@@ -128,7 +132,7 @@ def sindy(task: Task) -> Answer:
         if best is None or score > best[0]:
             best = score, k, coefficients
     assert best is not None
-    taken = time.perf_counter() - begin
+    taken = spent() - begin
     return Answer(predicted=_each(task, step, lambda held: _sindy_run(best[2], held)), seconds=taken)
 
 
@@ -137,7 +141,7 @@ def narx(task: Task) -> Answer:
     from sysidentpy.basis_function import Polynomial
     from sysidentpy.model_structure_selection import FROLS
 
-    begin = time.perf_counter()
+    begin = spent()
     step = max(1, round(0.04 / float(task.fitted.t[1] - task.fitted.t[0])))
     run = _coarser(task.fitted, step)
     with warnings.catch_warnings():
@@ -145,7 +149,7 @@ def narx(task: Task) -> Answer:
         model = FROLS(order_selection=True, n_info_values=15, ylag=6, info_criteria="bic", model_type="NAR",
                       basis_function=Polynomial(degree=3), err_tol=None)  # fmt: skip
         model.fit(X=None, y=run.y)
-    taken = time.perf_counter() - begin
+    taken = spent() - begin
 
     def predicted(held: Samples) -> Array:
         out = model.predict(X=None, y=held.y[: model.max_lag], forecast_horizon=held.t.size - model.max_lag)

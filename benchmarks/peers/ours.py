@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.peers.task import Answer, Task, study_text
+from benchmarks.peers.task import Answer, Task, spent, study_text
 from upright.identification import identify
 from upright.records import Record
 from upright.study import load_study
@@ -20,10 +19,10 @@ def answer(task: Task) -> Answer:
         f"{label}.csv": Record(t=run.t, signals={"u": run.u, **dict(zip(names, run.y.T, strict=True))}, units={})
         for label, run in {"fitted": task.fitted, **task.held_out}.items()
     }
-    begin = time.perf_counter()
+    begin = spent()
     study = load_study(Path("study.toml"), text=study_text(task), records=records)
     fit = identify(study.model, study.runs)
-    seconds = time.perf_counter() - begin
+    seconds = spent() - begin
     asked = {n: "actuator.gain" if n == "gain" else n for n in task.guesses}
     predicted: dict[str, np.ndarray] = {}
     for label, run in task.held_out.items():

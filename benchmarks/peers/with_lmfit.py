@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import time
-
 import lmfit
 import numpy as np
 
 from benchmarks.peers.least_squares import HORIZONS, predict, residual, simulated, started
-from benchmarks.peers.task import Answer, Task
+from benchmarks.peers.task import Answer, Task, spent
 
 
 def answer(task: Task) -> Answer:
@@ -20,7 +18,7 @@ def answer(task: Task) -> Answer:
         parameters.add(name, value=1.0, min=0.0)
     for k, value in enumerate(started(task, run)):
         parameters.add(f"start_{k}", value=float(value))
-    begin = time.perf_counter()
+    begin = spent()
     for seconds in HORIZONS if task.plant == "pendulum" else HORIZONS[-1:]:
         part = run.part(0, min(run.t.size, round(seconds / (run.t[1] - run.t[0]))))
         of = residual(task, part, scale)
@@ -29,7 +27,7 @@ def answer(task: Task) -> Answer:
             epsfcn=1e-8, max_nfev=2000,
         )  # fmt: skip
         parameters = found.params
-    taken = time.perf_counter() - begin
+    taken = spent() - begin
     x = np.array([v.value for v in parameters.values()])
     p, start = x[: scale.size] * scale, x[scale.size :]
     intervals = {

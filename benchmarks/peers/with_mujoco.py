@@ -6,7 +6,6 @@ modifier, so the numbers of a prediction are written into the model instead.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from mujoco import sysid  # type: ignore[attr-defined]
 
 from benchmarks.peers.least_squares import HORIZONS, started
-from benchmarks.peers.task import Answer, Samples, Task
+from benchmarks.peers.task import Answer, Samples, Task, spent
 
 OPTION = """<option timestep="{dt}" integrator="implicitfast" gravity="0 0 -{g}" iterations="50" tolerance="1e-10">
 <flag contact="disable"/></option>"""
@@ -117,7 +116,7 @@ def _predicted(best: Any, residual: Callable, run: Samples) -> np.ndarray:
 def answer(task: Task) -> Answer:
     """The whole task, intervals by `sysid.calculate_intervals`."""
     guesses, start = dict(task.guesses), started(task, task.fitted)
-    begin = time.perf_counter()
+    begin = spent()
     for seconds in HORIZONS if task.plant == "pendulum" else HORIZONS[-1:]:
         run = task.fitted
         part = run.part(0, min(run.t.size, round(seconds / (run.t[1] - run.t[0]))))
@@ -129,7 +128,7 @@ def answer(task: Task) -> Answer:
         start = x[len(guesses) :]
     left, *_ = residual(x, best)
     _, half = sysid.calculate_intervals([np.ravel(r) for r in left], np.asarray(found.jac, float))
-    taken = time.perf_counter() - begin
+    taken = spent() - begin
     values = dict(zip(guesses, x.tolist(), strict=False))
     predicted: dict[str, np.ndarray] = {}
     for label, run in task.held_out.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,6 +45,18 @@ def test_upright_finds_inertia_and_friction_of_a_small_swing():
     assert said.values["J_p"] == pytest.approx(J_P, rel=1e-3)
     assert said.values["b_2"] == pytest.approx(B_2, rel=1e-3)
     assert fit_percent(TASK.held_out["longer"], said.predicted["longer"])[0] > 99.9
+
+
+def test_opty_estimates_inertia_and_friction_and_gives_no_intervals():
+    pytest.importorskip("opty")
+    from benchmarks.peers import with_opty
+
+    said = with_opty.answer(replace(TASK, guesses={**TASK.guesses, "b_2c": 1e-6, "b_2q": 1e-6}))
+    # the midpoint rule in steps of h slows a swing by (omega h)^2/12 = 3e-4, J_A by twice that: J_p is 0.14 of J_A
+    assert said.values["J_p"] == pytest.approx(J_P, rel=6e-3)
+    assert said.values["b_2"] == pytest.approx(B_2, rel=2e-3)
+    assert fit_percent(TASK.held_out["longer"], said.predicted["longer"])[0] > 99.0
+    assert not said.intervals
 
 
 def test_arx_continues_a_damped_sine(monkeypatch):
