@@ -54,9 +54,15 @@ async function bench(): Promise<void> {
   const name = (known ?? all[0])?.name;
   if (!name) return message("This bench has no rig; start it with a RIG.toml.");
   // The rig's kernel is compiled at the first request: what stops the rig does not wait for it.
-  let moving = false, design: Design | undefined, built = "", wanted = place()[1];
+  let moving = false, drawing = false, design: Design | undefined, built = "", wanted = place()[1];
   const scene = () => {
     if (!session.scene) return;
+    if (!drawing) void (session.scene.still ? Promise.resolve(session.scene.still) : unknown(name)).then((why) => {
+      moving = why === "";
+      run.note = why;
+      scene();
+    });
+    drawing = true;
     bar.scene();
     model.show();
     const { coordinates, point, kind } = session.scene, now = JSON.stringify([coordinates, point, kind, moving]);
@@ -82,6 +88,7 @@ async function bench(): Promise<void> {
       if (before?.state !== "starting" && state?.state === "starting") session.history.clear();
       bar.show();
       model.show();
+      run.state();
       design?.gate();
       track.gate();
       if (identify.visible) {
@@ -136,11 +143,6 @@ async function bench(): Promise<void> {
   }
   addEventListener("hashchange", () => (place()[0] === name ? show(place()[1]) : location.reload()));
   show(wanted);
-  void unknown(name).then((why) => {
-    moving = why === "";
-    run.note = why;
-    scene();
-  });
   const frame = () => {
     if (!byId("run").hidden) run.draw();
     if (!byId("track").hidden) track.draw();

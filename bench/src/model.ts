@@ -34,7 +34,7 @@ export class Model {
     this.designing = true;
     message(DESIGNING);
     this.show();
-    const refused = await this.session.describe(fit);
+    const refused = await this.session.describe({ fit });
     this.designing = false;
     if (refused) message(refused); // else the page is loaded again
     this.show();

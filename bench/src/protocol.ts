@@ -31,6 +31,10 @@ export interface Scene {
   basis: { level: string; sentence: string };
   /** Which fit of the bench describes it, and of which log that is; "" where its own RIG.toml does. */
   model: { fit: string; of: string };
+  /** Of the filter that gives the law its velocities, 0 for plain differences; null where it has others. */
+  memory: number | null;
+  /** Why no page can move it by itself; "" where one can. */
+  still: string;
   follows: boolean;
   /** Where the law follows a reference: index of the coordinate that is looked at, and what predicts its answer. */
   tracked?: number;

@@ -1,6 +1,8 @@
 // Screen Run: the rig as it moves, its last ten seconds, the law that acts.
 
+import { message } from "./bar";
 import { byId, field, italic, make, say } from "./dom";
+import { type Filter, choices, noiseOf } from "./estimator";
 import { spoken } from "./plane";
 import { grouped } from "./poles";
 import type { State } from "./protocol";
@@ -16,6 +18,8 @@ const FAR = Math.PI + 0.5; // from what is held, from where on another turn of i
 interface Channel {
   canvas: HTMLCanvasElement;
   reading: HTMLElement;
+  /** Titles of the strip: of what is read, and of its velocity where there is one. */
+  titles: HTMLElement[];
   unit: string;
   scale: number;
   zero: number;
@@ -38,6 +42,8 @@ export class Run {
   private idle = 0;
 
   constructor(private readonly session: Session) {
+    byId("velocities").addEventListener("change", () => this.titled());
+    byId("filter").addEventListener("change", ({ target }) => void this.choose(Number((target as HTMLSelectElement).value)));
     byId("drawing").addEventListener("pointerdown", ({ clientX }) => {
       const box = byId("drawing").getBoundingClientRect();
       if (this.tappable) this.tap(clientX < box.left + box.width / 2 ? 1 : -1);
@@ -78,8 +84,12 @@ export class Run {
       byId("strips").append(make("div", { class: "strip" }, title, canvas));
       const reading = make("dd", { class: colour }, "–");
       byId("readings").append(make("div", {}, make("dt", {}, upright ? "from upright" : name), reading));
-      const least = unit === "deg" ? 5 : 1;
-      return { canvas, reading, unit, scale, zero: coordinate ? scene.point[i]! : 0, least, turns: upright ? 0 : NaN };
+      const least = unit === "deg" ? 5 : 1, titles = [title];
+      if (coordinate && scene.memory !== null) {
+        titles.push(make("h2", { hidden: "" }, mark.cloneNode(true), ` velocity of the ${name} `, make("span", { class: "unit" }, `[${unit}/s], as the law has it`)));
+        canvas.before(titles[1]!);
+      }
+      return { canvas, reading, titles, unit, scale, zero: coordinate ? scene.point[i]! : 0, least, turns: upright ? 0 : NaN };
     });
     if (known && !this.rig) {
       const q = DATA.start.filter((_, i) => i % 2 === 0), view = RigDrawing.view(OUTLINE, [q, q.map(() => 0)]);
@@ -87,6 +97,8 @@ export class Run {
       this.rig = new RigDrawing(byId("drawing"), OUTLINE, DATA.coordinates.map((c) => c.name), view);
     }
     byId("drawing").hidden = !known;
+    this.titled();
+    this.estimator();
     this.settings(known);
     this.law();
   }
@@ -104,6 +116,44 @@ export class Run {
       const words = spoken(group);
       return make("li", {}, words[0]!.toUpperCase() + words.slice(1));
     }));
+  }
+
+  /** What the law has for velocities, and which filters it may have. */
+  private estimator(): void {
+    const { memory, period, coordinates } = this.session.scene!, select = byId<HTMLSelectElement>("filter");
+    byId("velocity-filter").hidden = memory === null;
+    say(byId("velocity-words"), memory === null ? "The law has velocities of its own, which the bench does not know." : "");
+    if (memory === null) return;
+    const words = ({ cutoff, late }: Filter) => `${cutoff === undefined ? "plain difference" : `${significant(cutoff, 2)} Hz cutoff`}, ${significant(1e3 * late, 2)} ms late`;
+    select.replaceChildren(...choices(memory, period).map((each) => make("option", { value: `${each.memory}` }, words(each))));
+    select.value = `${memory}`;
+    const noise = coordinates.map(({ name, unit, per_unit }) => `${significant(noiseOf(memory, period, shownUnit(unit).scale / per_unit), 2)} ${shownUnit(unit).unit}/s of ${symbol(name)}`);
+    say(byId("velocity-why"), `v[k] = a v[k−1] + (1 − a) (y[k] − y[k−1]) / T, a = ${memory} and T = ${significant(1e3 * period)} ms. A low cutoff is quiet and late: v lags by T/2 + a T/(1 − a), which the poles feel, and the rounding of counts gives it an rms of q (1 − a) / (T √(6 (1 + a))), now ${noise.join(", ")}.`);
+    say(byId("velocity-source"), "Paper: encoders and numerical differentiation; rounding as white noise: Widrow.");
+  }
+
+  /** What may be chosen now. */
+  state(): void {
+    byId<HTMLSelectElement>("filter").disabled = this.session.unsteerable !== "" || ["starting", "running"].includes(this.session.state?.state ?? "");
+  }
+
+  private async choose(memory: number): Promise<void> {
+    const refused = await this.session.describe({ memory });
+    if (!refused) return; // the page is loaded again
+    message(refused);
+    this.estimator();
+  }
+
+  private get velocities(): boolean {
+    return byId<HTMLInputElement>("velocities").checked;
+  }
+
+  private titled(): void {
+    for (const { titles: [place, velocity] } of this.channels) if (velocity) {
+      place!.hidden = this.velocities;
+      velocity.hidden = !this.velocities;
+    }
+    this.idle = IDLE;
   }
 
   private settings(known: boolean): void {
@@ -139,11 +189,16 @@ export class Run {
       if (Math.abs(away - 2 * Math.PI * channel.turns) > FAR) channel.turns = Math.round(away / (2 * Math.PI));
       const zero = channel.zero + 2 * Math.PI * (channel.turns || 0), text = Number.isFinite(value) ? `${signed((value - zero) * scale, c < n ? 1 : 2)} ${unit}` : "–";
       say(reading, text);
+      const times = Array.from({ length: 6 }, (_, i) => (i === 5 ? "now" : `\u2212${seconds - (i * seconds) / 5} s`));
+      if (this.velocities && channel.titles.length > 1) return drawStrip(canvas, {
+        ...about(history.fastest(c) * scale, 2 * least, `${unit}/s`), colour: `--q${c % 4}`, count: ticks, times,
+        at: (k) => history.rate(c, ticks - 1 - k) * scale,
+      });
       drawStrip(canvas, {
         ...(c < n ? about(history.farthest(c, zero) * scale, least, unit) : limited(scene.command.limit, history.farthest(c, 0))),
         colour: c < n ? `--q${c % 4}` : "--effort", count: ticks, at: (k) => (history.ago(c, ticks - 1 - k) - zero) * scale,
         ...(c === scene.tracked ? { also: (k) => (this.session.followed.at(history.last - (ticks - 1 - k), scene.period, c) - zero) * scale } : {}),
-        times: Array.from({ length: 6 }, (_, i) => (i === 5 ? "now" : `\u2212${seconds - (i * seconds) / 5} s`)),
+        times,
       });
     });
     this.lamp.classList.toggle("on", this.saturates());

@@ -59,24 +59,24 @@ export class Session {
     if (this.connection.send(request)) this.on.steered(request);
   }
 
-  /** Lets a fit describe the rig, or what came with it where there is none; why not, or "". */
-  async describe(fit: string): Promise<string> {
+  /** Lets a fit describe the rig, or what came with it where that is ""; or another filter give velocities; why not, or "". */
+  async describe(by: { fit: string } | { memory: number }): Promise<string> {
     if (this.unsteerable) return this.unsteerable;
     const headers = { "x-bench-me": this.scene?.you ?? "" }, address = `/api/rigs/${encodeURIComponent(this.name)}/model`;
-    const answer = await fetch(address, { method: "POST", headers, body: JSON.stringify({ fit }) }).catch(() => undefined);
+    const answer = await fetch(address, { method: "POST", headers, body: JSON.stringify(by) }).catch(() => undefined);
     return answer?.ok ? "" : ((await answer?.text()) ?? NO_CONNECTION);
   }
 
   private received(received: ServerMessage): void {
     if (received.type === "scene") {
       // What the page computes with is the model's that it was loaded with.
-      if (this.scene && this.scene.model.fit !== received.model.fit) return location.reload();
+      if (this.scene && (this.scene.model.fit !== received.model.fit || this.scene.memory !== received.memory)) return location.reload();
       const fresh = !this.connected;
       this.scene = received;
       this.followed.take(received.reference);
       sessionStorage.setItem(ME, received.you);
       this.connected = true;
-      if (fresh) this.history = new History(received.coordinates.map((c) => c.per_unit), Math.round(SECONDS / received.period));
+      if (fresh) this.history = new History(received.coordinates.map((c) => c.per_unit), Math.round(SECONDS / received.period), received.period, received.memory);
       this.on.scene();
     } else if (received.type === "state") {
       const before = this.state;

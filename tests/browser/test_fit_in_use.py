@@ -20,6 +20,7 @@ from upright.browser.identify.fitted import fitted_rig
 from upright.browser.rig import HARDWARE, known_rig
 from upright.browser.serve import Bench
 from upright.errors import BadInput
+from upright.laws import of_values
 from upright.rig.makes import make_rig
 from upright.running.rig import model_and_truth
 from upright.study.stored_fit import FORMAT
@@ -114,6 +115,33 @@ def test_what_is_not_trusted_or_of_another_rig_is_refused_and_nothing_changes(se
     page.note("state", state="running")
     assert "runs; stop it first" in use(bench, page.me, "fit-3")[1]
     assert bench.stations[0].rig is before
+
+
+def test_another_filter_gives_the_same_gains_other_velocities_from_the_next_start_on(served):
+    bench, page, carry, folder = served
+    written_fit(folder, "fit-1", trusted=False)
+    K = np.array(page.scene["K"])
+    assert page.scene["memory"] == 0.5
+    body = json.dumps({"memory": 0.9}).encode()
+    assert ask(bench, "api/rigs/furuta/model", page.me, data=body)[0] == 200
+    scene = page.note("scene", memory=0.9)
+    assert (scene["K"], scene["model"]) == (K.tolist(), {"fit": "", "of": ""})
+    page.ask("start")
+    carry.go()
+    law, T = of_values(carry.orders[0].law), scene["period"]
+    y = np.cumsum(np.random.default_rng(0).normal(size=(200, 2)), axis=0)
+    z, v = law.begin @ y[0], np.zeros(2)
+    for k in range(200):
+        if k:
+            v = 0.9 * v + 0.1 * (y[k] - y[k - 1]) / T
+        reading = np.concatenate([y[k], np.zeros(law.B.shape[1] - 2)])  # with its reference at 0
+        assert law.C @ z + law.D @ reading == pytest.approx(-K[0::2] @ y[k] - K[1::2] @ v, rel=1e-9)
+        z = law.A @ z + law.B @ reading
+    for body in (b'{"memory": "0.9"}', b'{"memory": true}', b"{}"):
+        assert "memory" in ask(bench, "api/rigs/furuta/model", page.me, data=body)[2]
+    carry.end()
+    page.note("state", state="ended")
+    assert "from 0 to 0.99" in ask(bench, "api/rigs/furuta/model", page.me, data=b'{"memory": 1.5}')[2]
 
 
 REAL = """kind = "serial"

@@ -494,6 +494,10 @@ def test_of_several_rigs_each_has_its_page_and_one_without_a_drawing_says_why(ch
         one.reads("#rig-name", "disks")
         one.reads("#rig-note", "needs a rig with one drive and an inverted equilibrium")
         assert not one.page.locator("#tab-design").is_visible()
+        one.page.select_option("#filter", "0.9")
+        one.page.wait_for_function("() => document.querySelector('#velocity-why')?.textContent.includes('a = 0.9 ')")
+        one.page.check("#velocities")
+        one.reads("#strips", r"velocity of the .* \[deg/s\]")
         one.starts()
         one.reads("#readings", "deg")
         tab_to(one.page, "#tab-run")
@@ -513,6 +517,7 @@ def test_of_several_rigs_each_has_its_page_and_one_without_a_drawing_says_why(ch
         one.reads("#track-now", "step, 30.0 deg")
         one.reads("#track-figures", r"error, rms, last second\s*(0\.\d|below one count)")  # the far disk is there
         one.leaves()
+        assert one.wrong == []
 
 
 def test_all_samples_of_1_kHz_take_less_than_15_kB_a_second(server, chromium):

@@ -44,6 +44,8 @@ class Hub:
         outbox = Outbox()
         self.clients[outbox] = who
         self.station.lease.back(who)
+        if self.station.rig.still:
+            self.station.prepare()  # no page asks for its twin, after which another rig's is prepared
         outbox.note(self._scene_of(who))
         outbox.note(json.dumps(self.station.described(who)))
         return who, outbox

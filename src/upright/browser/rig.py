@@ -23,7 +23,7 @@ from upright.gains import Estimator, feedback, filtered, place, prefilter
 from upright.gains.placement import swift_gains
 from upright.gains.requests import read_poles
 from upright.laws import Law, Rule, as_values
-from upright.live.twin import Loop
+from upright.live.twin import Loop, unplayable
 from upright.paper.reproduce import TABLE_1
 from upright.records import Array
 from upright.rig import Rig
@@ -31,8 +31,8 @@ from upright.rigs.rigfile import RigFile, read_rig_file
 from upright.running.rig import LEAN, model_and_truth, read_law
 from upright.systems import StateSpace
 
-MEMORY = 0.5
-"""Of the filter that gives speeds, where nobody chose another."""
+MEMORY, LONGEST_MEMORY = 0.5, 0.99
+"""Of the filter that gives speeds, where nobody chose another, and the longest that may be chosen."""
 TWIN, HARDWARE = "TWIN", "HARDWARE"
 
 
@@ -83,6 +83,40 @@ class BenchRig:
         """Equilibrium that is held."""
         return self.file.at if self.file.at in self.model.plant.equilibria else self.zero
 
+    @property
+    def still(self) -> str:
+        """Why no page can move it by itself; empty where one can."""
+        if self.loop is None:
+            return f"the law of {self.name} is no feedback of states, so that nothing of it can be dragged."
+        lacks = unplayable(self.model)
+        return "" if lacks is None else f"a twin in the page needs {lacks}."
+
+    @property
+    def memory(self) -> float | None:
+        """Of the filter that gives the velocities, 0 for plain differences; None where the law has others."""
+        if self.loop is None:
+            return None
+        p, A = len(self.model.per_unit), self.loop.estimator.A
+        return float(A[p, p]) if len(A) > p else 0.0
+
+    def with_memory(self, memory: float, folder: Path) -> BenchRig:
+        """The same gains on velocities of another filter; its law is stored in the folder.
+
+        Raises
+        ------
+        BadInput
+            When the law is no state feedback from differences, or there is no such filter.
+        """
+        if self.loop is None:
+            raise BadInput(f"the law of {self.name} has no filter for its velocities.")
+        if not 0.0 <= memory <= LONGEST_MEMORY:
+            raise BadInput(f"a filter's a lies from 0 to {LONGEST_MEMORY:g}, got {memory:g}.")
+        loop = _looped(self.model, self.at, _differences(self.model, self.at, memory), self.loop.K, self.follows)
+        path = folder / f"law_{memory:g}.json"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, json.dumps({"law": as_values(loop.law), "basis": self.basis.plain()}).encode())
+        return replace(self, law_path=path, law=loop.law, loop=loop)
+
     @cached_property
     def linear(self) -> StateSpace:
         """Its linear model about what is held."""
@@ -127,7 +161,7 @@ class BenchRig:
             "poles": [] if self.loop is None else self.poles(self.loop.K),
             "K": [] if self.loop is None else self.loop.K[0].tolist(),
             "follows": self.follows, "basis": self.basis.plain(), **self._loop_to_follow,
-            "model": {"fit": self.fit, "of": self.fit_of},
+            "model": {"fit": self.fit, "of": self.fit_of}, "memory": self.memory, "still": self.still,
             "lean": self.lean, "facts": facts(self.model, self.at, self.tracked),
         }  # fmt: skip
 
@@ -222,8 +256,7 @@ def _name(path: Path) -> str:
 def _proposed(rig: BenchRig) -> Loop:
     """The loop of the paper's first pole set for its own rig, else as `upright design` proposes one."""
     model, at = rig.model, rig.at
-    linear = model.linear(at)
-    way = filtered(linear.to_sampled(model.period, model.delay / model.period, model.lag), MEMORY)
+    linear, way = model.linear(at), _differences(model, at, MEMORY)
     if rig.file.known is None and rig.file.make == "furuta":
         K = place(linear.A, linear.B, read_poles(TABLE_1[0])).K
     else:
@@ -232,6 +265,10 @@ def _proposed(rig: BenchRig) -> Loop:
             limit=model.saturation, on=model,
         )).continuous  # fmt: skip
     return _looped(model, at, way, K, follow=True)
+
+
+def _differences(model: Rig, at: str, memory: float) -> Estimator:
+    return filtered(model.linear(at).to_sampled(model.period, model.delay / model.period, model.lag), memory)
 
 
 def _looped(model: Rig, at: str, way: Estimator, K: Array, follow: bool) -> Loop:
@@ -252,11 +289,10 @@ def _recognized(law: Law | Rule, model: Rig, at: str) -> Loop | None:
     p = len(model.per_unit)
     if not isinstance(law, Law) or law.D.shape[0] != 1 or law.readings != p or len(law.A) not in (p, 2 * p):
         return None
-    linear = model.linear(at)
     memory = float(law.A[p, p]) if len(law.A) == 2 * p else 0.0
     if not 0.0 <= memory < 1.0:
         return None
-    way = filtered(linear.to_sampled(model.period, model.delay / model.period, model.lag), memory)
+    way = _differences(model, at, memory)
     if law.A.shape != way.A.shape or not np.allclose(law.A, way.A) or not np.allclose(law.B[:, :p], way.B):
         return None
     states, commands = np.hstack([way.C, way.D]), -np.hstack([law.C, law.D[:, :p]])

@@ -6,7 +6,7 @@ from upright.browser.rig import BenchRig
 from upright.control.preflight import Task
 from upright.errors import BadInput
 from upright.live.page import in_script
-from upright.live.twin import moving, unplayable
+from upright.live.twin import moving
 from upright.rig.variation import allowed
 
 LANES, SEED, SECONDS = 200, 0, 3.0
@@ -21,10 +21,8 @@ def twin_script(rig: BenchRig) -> str:
     BadInput
         When the law is no feedback of states, or the rig cannot be drawn or compiled for a page.
     """
-    if rig.loop is None:
-        raise BadInput(f"the law of {rig.name} is no feedback of states, so that nothing of it can be dragged.")
-    if (lacks := unplayable(rig.model)) is not None:
-        raise BadInput(f"a twin in the page needs {lacks}.")
+    if rig.loop is None or rig.still:
+        raise BadInput(rig.still)
     from upright.experiments.regulation_2.run import HAND, START
 
     still = [0.0] * (2 * len(rig.model.per_unit) - 2)

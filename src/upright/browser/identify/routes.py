@@ -88,13 +88,16 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         return JSONResponse({})
 
     async def adopt(request: Request, own: Identifications) -> Response:
-        key = _fit_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
+        key, memory = _model_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
         if fixed:
             raise BadInput(fixed)
         hub = hubs[request.path_params["name"]]
-        hub.station.at_rest()
-        rig = await asyncio.to_thread(own.described_by, key)
-        hub.station.describe(request.headers.get(WHO, ""), rig)
+        station = hub.station
+        station.at_rest()
+        rig = station.rig if key is None else await asyncio.to_thread(own.described_by, key)
+        if memory is not None:
+            rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
+        station.describe(request.headers.get(WHO, ""), rig)
         return JSONResponse({})
 
     return [
@@ -123,14 +126,21 @@ def _wanted(text: bytes) -> tuple[str, str, dict[str, str]]:
     return log, of, known
 
 
-def _fit_named(text: bytes) -> str:
+def _model_named(text: bytes) -> tuple[str | None, float | None]:
+    """Which fit is to describe a rig, and which memory its velocities' filter is to have; None for what stays."""
     try:
-        key: Any = json.loads(text)["fit"]
-    except (ValueError, RecursionError, KeyError, TypeError):
-        key = None
-    if not isinstance(key, str):
-        raise BadInput('a model is chosen by {"fit": "fit-1"}, and by {"fit": ""} the one that the rig came with.')
-    return key
+        content: Any = json.loads(text)
+        key, memory = content.get("fit"), content.get("memory")
+        number = isinstance(memory, int | float) and not isinstance(memory, bool)
+        read = isinstance(key, str | None) and (memory is None or number) and (key, memory) != (None, None)
+    except (ValueError, RecursionError, AttributeError):
+        key, memory, read = None, None, False
+    if not read:
+        raise BadInput(
+            'a model is chosen by {"fit": "fit-1"}, and by {"fit": ""} the one that the rig came with; the filter of '
+            'its velocities by {"memory": 0.8}.'
+        )
+    return key, memory
 
 
 def _operates(hub: Hub, who: str) -> None:
