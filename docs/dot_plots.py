@@ -7,23 +7,47 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from upright.report.drawing import CYCLE, GREY, figure, save, styled
 
 _NUMBER = r"([\d.]+)"
+_AFTER = rf"{_NUMBER} s, {_NUMBER}"
 _MARKS = "osD^"
+_APART = 0.2
+"""Between two series of one row, so that neither hides the other [rows]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """Where in a row a number is: which cell after the name, and the pattern of the number, or of it and its range."""
+    """Where in a row a number is.
+
+    Attributes
+    ----------
+    at : int
+        Which cell after the name.
+    pattern : str
+        Of the number, or of it and its range.
+    table : int
+        Which table of the page.
+    whole : str
+        Of what of which that is a share: percents are drawn.
+    where : str
+        What the row must hold, its name included; every row does by itself.
+    """
 
     at: int = 0
     pattern: str = _NUMBER
+    table: int = 0
+    whole: str = ""
+    where: str = ""
 
     def of(self, cells: Sequence[str]) -> list[tuple[float, float, float]]:
         """Every such number with the ends of its range, itself where it has none."""
         matches = re.finditer(self.pattern, cells[self.at])
-        return [tuple(float(n) for n in (m.groups() * 3)[:3]) for m in matches]
+        most = re.search(self.whole, cells[self.at]) if self.whole else None
+        unit = 100 / float(most[1]) if most else 1.0
+        return [tuple(unit * float(n) for n in (m.groups() * 3)[:3]) for m in matches]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +66,8 @@ class Shown:
         All of which these are some, where a row counts: a share [%] is drawn.
     named : int
         Cells that make the name of a row.
+    kinds : sequence of (str, str)
+        Patterns and names of kinds of rows: all rows of a kind are one, by the first pattern that they match.
     log : bool
         Whether the axis is logarithmic.
     """
@@ -51,6 +77,7 @@ class Shown:
     targets: Mapping[str, float | Cell] = field(default_factory=dict)
     of: Cell | None = None
     named: int = 1
+    kinds: Sequence[tuple[str, str]] = ()
     log: bool = False
 
 
@@ -69,11 +96,30 @@ SHOWN: Mapping[str, Shown] = {
         series={"": Cell(pattern=rf"{_NUMBER} % inside")},
         targets={"nominal": 90.0},
     ),
+    "crash": Shown(
+        label="read again, of all logs, or of all rows said to be written [%]",
+        series={
+            "logs, or rows": Cell(
+                at=1,
+                pattern=r"(?:readable |rows from |, read )(\d+)",
+                whole=r"(?:^|readable \d+ of |rows said to be there )(\d+)(?: files|;|,)",
+            ),
+            "rows of a log, median": Cell(at=1, pattern=r"rows kept (\d+) %"),
+        },
+    ),
     "dying": Shown(
         label="command on after the death [ms]",
         series={"longest": Cell()},
         targets={"bound": Cell(at=1)},
         named=2,
+    ),
+    "false_stops": Shown(
+        label="from the fault to the stop, median and nine tenths [s]",
+        series={
+            "Furuta pendulum": Cell(at=4, pattern=_AFTER, table=1),
+            "pendulum on a cart": Cell(at=4, pattern=_AFTER, table=2),
+        },
+        log=True,
     ),
     "first": Shown(
         label="contacts that end with a trusted fit [%]",
@@ -105,6 +151,26 @@ SHOWN: Mapping[str, Shown] = {
     "peers": Shown(
         label="of runs that no fit has seen, explained [%]",
         series={"uw, tail": Cell(), "aau, tail": Cell(at=1), "aau, restarted": Cell(at=2)},
+    ),
+    "quick_lab": Shown(
+        label="farthest that the driven body went, of its travel [%]",
+        series={
+            "Furuta pendulum": Cell(at=2, where=r"^furuta .*\| yes$"),
+            "pendulum on a cart": Cell(at=2, where=r"^linear .*\| yes$"),
+            "not right": Cell(at=2, where=r"\*\*no\*\*$"),
+        },
+        targets={"end of the travel": 100.0},
+        kinds=(
+            (r"^\S+ \d+ \| none", "no fault"),
+            (r"^\S+ \d+ \| [^|]*,", "two faults"),
+            (r"drive × -1 ", "motor leads swapped"),
+            (r"drive × -", "leads swapped, weak supply"),
+            (r"drive × ", "weak supply"),
+            (r"× -1 ", "encoder's channels swapped"),
+            (r"× 1.024 ", "counts 2.4 % off"),
+            (r"× -", "channels swapped, wrong counts"),
+            (r"× ", "wrong counts"),
+        ),
     ),
     "real": Shown(
         label="explained, run by run [%]",
@@ -147,7 +213,7 @@ SHOWN: Mapping[str, Shown] = {
         targets={"target": 1.8},
     ),
 }
-"""What is drawn of the first table of each page; other pages have a picture already, or nothing that dots would show."""
+"""What is drawn of the tables of each page; other pages have a picture already, or nothing that dots would show."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,30 +226,60 @@ class Row:
 
 
 def rows(page: str, shown: Shown) -> list[Row]:
-    """Rows of the first table of a page that have something to draw."""
+    """Rows that have something to draw: of the first table of a page, or of those that its cells name."""
+    tables = _tables(page)
+    used = sorted({cell.table for cell in shown.series.values()})
+    merged = bool(shown.kinds) or used != [0]
+    out: dict[str | int, Row] = {}
+    for number in used:
+        for line in tables[number][1]:
+            row = _row(line, number, shown)
+            if not any(row.measured.values()):
+                continue
+            key = row.name if merged else len(out)
+            if key in out:
+                so_far = out[key].measured
+                both = {name: [*so_far[name], *more] for name, more in row.measured.items()}
+                row = Row(name=row.name, measured=both, targets=row.targets)
+            out[key] = row
+    order = [name for _, name in shown.kinds]
+    return (
+        sorted(out.values(), key=lambda row: order.index(row.name)) if order else list(out.values())
+    )
+
+
+def _tables(page: str) -> list[tuple[int, list[str]]]:
+    """Number of the line above which a table's rule stands, and the lines below that, of each table."""
     lines = page.split("\n")
-    begin = next(i for i, line in enumerate(lines) if re.fullmatch(r"\|[-:| ]+\|", line)) + 1
-    end = next(i for i, line in enumerate([*lines[begin:], ""], begin) if not line.startswith("|"))
-    out: list[Row] = []
-    for line in lines[begin:end]:
-        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-        rest = cells[shown.named :]
-        measured = {name: cell.of(rest) for name, cell in shown.series.items()}
-        if shown.of is not None:
-            most = shown.of.of(rest)
-            measured = {
-                name: [tuple(100 * n / most[0][0] for n in each) for each in numbers if most]
-                for name, numbers in measured.items()
-            }
-        targets: dict[str, float] = {}
-        for name, target in shown.targets.items():
-            numbers = target.of(rest) if isinstance(target, Cell) else [(target, target, target)]
-            targets |= {name: numbers[0][0]} if numbers else {}
-        if any(measured.values()):
-            out.append(
-                Row(name=", ".join(cells[: shown.named]), measured=measured, targets=targets)
-            )
-    return out
+    rules = [i for i, line in enumerate(lines) if re.fullmatch(r"\|[-:| ]+\|", line)]
+    ends = [
+        next(i for i, line in enumerate([*lines[r + 1 :], ""], r + 1) if not line.startswith("|"))
+        for r in rules
+    ]
+    return [(r - 1, lines[r + 1 : end]) for r, end in zip(rules, ends, strict=True)]
+
+
+def _row(line: str, table: int, shown: Shown) -> Row:
+    """What a line of a table says."""
+    text = line.strip().strip("|").strip()
+    cells = [cell.strip() for cell in text.split("|")]
+    rest = cells[shown.named :]
+    measured = {
+        name: cell.of(rest) if cell.table == table and re.search(cell.where, text) else []
+        for name, cell in shown.series.items()
+    }
+    if shown.of is not None:
+        most = shown.of.of(rest)
+        measured = {
+            name: [tuple(100 * n / most[0][0] for n in each) for each in numbers if most]
+            for name, numbers in measured.items()
+        }
+    targets: dict[str, float] = {}
+    for name, target in shown.targets.items():
+        numbers = target.of(rest) if isinstance(target, Cell) else [(target, target, target)]
+        targets |= {name: numbers[0][0]} if numbers else {}
+    kind = next((name for pattern, name in shown.kinds if re.search(pattern, text)), "")
+    return Row(name=kind or ", ".join(cells[: shown.named]), measured=measured, targets=targets)
 
 
 @styled
@@ -191,8 +287,11 @@ def draw(table: Sequence[Row], shown: Shown, path: Path) -> None:
     """Write the picture of the rows of a table."""
     drawing = figure(0.9 + 0.2 * len(table))
     ax = drawing.subplots()
-    for (name, _), (colour, _), mark in zip(shown.series.items(), CYCLE, _MARKS, strict=False):
-        dots = [(x, y) for y, row in enumerate(table) for x in row.measured[name]]
+    apart = _APART * (np.arange(len(shown.series)) - (len(shown.series) - 1) / 2)
+    for (name, _), (colour, _), mark, off in zip(
+        shown.series.items(), CYCLE, _MARKS, apart.tolist(), strict=False
+    ):
+        dots = [(x, y + off) for y, row in enumerate(table) for x in row.measured[name]]
         for (_, low, high), y in dots:
             ax.plot([low, high], [y, y], color=colour, linewidth=1.0)
         ax.plot(
@@ -241,6 +340,9 @@ def with_picture(name: str, page: str, folder: Path) -> str:
         return page
     folder.mkdir(parents=True, exist_ok=True)
     draw(table, shown, folder / f"{name}.svg")
-    before, head, after = re.split(r"(?m)^(\|.*\n\|[-:| ]+\|)$", page, maxsplit=1)
     alt = f"Dots for {len(table)} rows of the table below: {shown.label}"
-    return f"{before}![{alt}]({folder.name}/{name}.svg)\n\n{head}{after}"
+    if shown.kinds:
+        alt = f"Dots for {len(table)} kinds of rows of the table below: {shown.label}"
+    lines = page.split("\n")
+    above = _tables(page)[min(cell.table for cell in shown.series.values())][0]
+    return "\n".join([*lines[:above], f"![{alt}]({folder.name}/{name}.svg)", "", *lines[above:]])

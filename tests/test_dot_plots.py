@@ -47,6 +47,20 @@ def test_numbers_of_several_cells_have_names_ranges_bounds_and_shares():
     assert row.measured[""] == [(75.0, 75.0, 75.0)]
 
 
+def test_rows_of_a_kind_are_one_and_a_row_of_two_tables_has_the_dots_of_both():
+    page = "| a | b |\n|--|--:|\n| x 1 | 3 |\n| y 2 | 4 |\n| x 3 | 5 |\n\n| a | b |\n|--|--:|\n| x 1 | 6 |\n"
+    kinds = Shown(
+        label="%", series={"even": Cell(where="[46]$"), "odd": Cell(where="[35]$")}, kinds=(("y", "Y"), ("x", "X"))
+    )
+    assert [(row.name, row.measured) for row in rows(page, kinds)] == [
+        ("Y", {"even": [(4.0, 4.0, 4.0)], "odd": []}),
+        ("X", {"even": [], "odd": [(3.0, 3.0, 3.0), (5.0, 5.0, 5.0)]}),
+    ]
+    both = rows(page, Shown(label="%", series={"first": Cell(), "second": Cell(table=1)}))
+    assert [row.name for row in both] == ["x 1", "y 2", "x 3"]
+    assert both[0].measured == {"first": [(3.0, 3.0, 3.0)], "second": [(6.0, 6.0, 6.0)]}
+
+
 def test_the_page_stays_as_it_is_but_for_the_picture_above_its_first_table(tmp_path):
     page = with_picture("kept", PAGE, tmp_path / "pictures")
     (picture,) = (line for line in page.split("\n") if line.startswith("!["))
@@ -64,5 +78,6 @@ def test_every_page_that_is_to_have_a_picture_has_rows_for_it(name):
     page = (PAGES / f"{name}.md").read_text(encoding="utf-8")
     drawn = rows(page, SHOWN[name])
     table = page[page.index("\n|") + 1 :].split("\n\n")[0].split("\n")[2:]
-    assert len(drawn) >= 0.35 * len([line for line in table if line.startswith("|")])
+    dots = sum(max(map(len, row.measured.values())) for row in drawn)
+    assert dots >= 0.35 * len([line for line in table if line.startswith("|")])
     assert {s for row in drawn for s, numbers in row.measured.items() if numbers} == set(SHOWN[name].series)
