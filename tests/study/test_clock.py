@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+import upright as up
 from upright.errors import BadInput
 from upright.records import Provenance, Record
 from upright.study.clock import check_clock, with_time_unit
@@ -49,3 +52,26 @@ def test_numbers_of_a_stated_unit_are_seconds(unit, seconds):
 def test_a_unit_that_is_none_of_time_is_refused(unit):
     with pytest.raises(BadInput, match=f"expected a unit of time, such as 'ms', 'us' or 's', got '{unit}'"):
         with_time_unit(log(4.0), unit)
+
+
+ROWS = "".join(f"angle:{np.sin(0.1 * i):.6f},speed:{np.cos(0.1 * i):.6f}\n" for i in range(60))
+COUNTED = {
+    "plotter": ROWS,
+    "index": "k,angle\n" + "".join(f"{i},{np.sin(0.1 * i):.6f}\n" for i in range(60)),
+    "frame": json.dumps({"angle": [float(np.sin(0.1 * i)) for i in range(60)], "u": [0.0] * 60}),
+}
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_rows_without_a_time_are_counted_where_somebody_says_what_lies_between_two(name, tmp_path):
+    (tmp_path / "log.txt").write_text(COUNTED[name], encoding="utf-8")
+    with pytest.raises(BadInput, match='time_unit="20 ms"'):
+        up.read(tmp_path / "log.txt")
+    record = up.read(tmp_path / "log.txt", time_unit="20 ms")
+    np.testing.assert_allclose(record.t, 0.02 * np.arange(60), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(record["angle"], np.sin(0.1 * np.arange(60)), rtol=0, atol=1e-6)
+
+
+def test_a_log_that_begins_with_a_column_that_rises_keeps_it_as_its_time(tmp_path):
+    (tmp_path / "log.txt").write_text("0 5\n1 6\n2 4\n3 5\n" * 1, encoding="utf-8")
+    assert up.read(tmp_path / "log.txt", time_unit="20 ms").t == pytest.approx([0, 0.02, 0.04, 0.06])

@@ -18,7 +18,7 @@ from upright.records import PathLike, Record
 __all__ = ["READERS", "inspect", "read", "reader_of"]
 
 
-def read(path: PathLike, *, reader: str | None = None) -> Record:
+def read(path: PathLike, *, reader: str | None = None, counted: bool = False) -> Record:
     """Record of a log.
 
     Parameters
@@ -27,13 +27,15 @@ def read(path: PathLike, *, reader: str | None = None) -> Record:
         File as its program wrote it.
     reader : str, optional
         One of `READERS`, when the content is not to be judged.
+    counted : bool
+        Whether the rows of a table without a time are counted, instead of refused.
 
     Raises
     ------
     BadInput
         When the file cannot be read, with the line and the column of the trouble.
     """
-    return read_source(load(path), reader=reader)
+    return read_source(replace(load(path), counted=counted), reader=reader)
 
 
 def read_source(source: Source, *, reader: str | None = None) -> Record:

@@ -26,10 +26,11 @@ _BLOCK = 1 << 22  # characters of a table that are read at a time; NumPy needs f
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """Content of one log and the name to call it by."""
+    """Content of one log and the name to call it by; where its rows are `counted`, one without a time is no mistake."""
 
     file: str
     data: bytes
+    counted: bool = False
 
     @cached_property
     def text(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from upright.errors import BadInput
 from upright.records import Record
-from upright.units import known, same_dimension, scale
+from upright.units import known, parse, same_dimension, scale
 
 SLOWEST = 2.0
 """Seconds between samples beyond which nothing of a pendulum, a cart or a disk is seen."""
@@ -16,6 +16,8 @@ USUAL = 1e-4, 0.5
 def with_time_unit(record: Record, unit: str) -> Record:
     """Record whose time [s] was read from numbers in `unit`, such as "ms", that state none themselves.
 
+    Of rows that are counted the unit is what lies between two of them, as in "20 ms".
+
     Raises
     ------
     BadInput
@@ -23,9 +25,16 @@ def with_time_unit(record: Record, unit: str) -> Record:
     """
     if not unit:
         return record
+    if counts_rows(unit):
+        return record.replace(t=record.t * parse(unit, "s"))
     if not (known(unit) and same_dimension(unit, "s")):
         raise BadInput(f"expected a unit of time, such as 'ms', 'us' or 's', got '{unit[:40]}'.")
     return record.replace(t=record.t * scale(unit))
+
+
+def counts_rows(unit: str) -> bool:
+    """Whether a unit of time is a time between two rows: a number with its unit."""
+    return unit.strip()[:1].isdigit()
 
 
 def check_clock(record: Record) -> None:

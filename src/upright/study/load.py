@@ -24,7 +24,7 @@ from upright.physics import Plant
 from upright.physics.actuator import ACTUATOR
 from upright.records import Array, Record
 from upright.rig import Hardware, Rig
-from upright.study.clock import check_clock, with_time_unit
+from upright.study.clock import check_clock, counts_rows, with_time_unit
 from upright.study.coordinates import Sensors
 from upright.study.description import read_hardware, rig_with_guesses
 from upright.study.keys import names
@@ -169,7 +169,7 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, ...], Record]) -> Rec
         if not os.path.exists(file):  # Path.exists raises for a name that is too long
             raise run.error("file", f"the log {str(file)[-200:]} does not exist; {_instead(file, folder)}")
         with run.at("reader" if reader else "file"):
-            record = read(file, reader=reader or None)
+            record = read(file, reader=reader or None, counted=counts_rows(unit))
         with run.at("time_unit" if unit else "time"):
             logs[key] = with_time_unit(record.replace(t=record[time]) if time else record, unit)
     return logs[key]

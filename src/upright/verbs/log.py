@@ -43,7 +43,8 @@ def read(file: Log, *, reader: str | None = None, time_unit: str | None = None) 
     reader : str, optional
         Reader of the log, when it is not recognised.
     time_unit : str, optional
-        Unit of a file's time column that states none, such as "ms"; seconds when omitted.
+        Unit of a file's time column that states none, such as "ms"; seconds when omitted. Or the time between two rows
+        of a log that has no such column, such as "20 ms".
 
     Returns
     -------
@@ -70,7 +71,7 @@ def show(log: Log, *, out: PathLike | None = None, time_unit: str | None = None)
         Folder for the picture show-LOG.svg, or the picture's own name (SVG, PNG); the answer's ``plot()`` draws it
         without a file.
     time_unit : str, optional
-        Unit of a file's time column that states none, such as "ms".
+        Unit of a file's time column that states none, such as "ms"; or the time between two rows, such as "20 ms".
 
     Returns
     -------
@@ -96,7 +97,7 @@ def show(log: Log, *, out: PathLike | None = None, time_unit: str | None = None)
         at = Path(out)
         files.append(at if at.suffix in (".svg", ".png") else picture_path(path, folder(at)))
         save(draw_columns(record, inspection), files[-1])
-    clock = f" --time-unit {time_unit}" if time_unit else ""
+    clock = f" --time-unit {typed(time_unit)}" if time_unit else ""
     onward = Step(
         "Write a study file, filled in with what was recognised.", f"upright init {typed(path)}{clock} -o study.toml"
     )
@@ -127,7 +128,7 @@ def show_logs(
     plot : bool
         Draw the columns to show-LOG.svg.
     time_unit : str
-        Unit of a time column that states none, such as ms.
+        Unit of a time column that states none, such as ms; or the time between two rows, such as "20 ms".
 
     Yields
     ------
@@ -342,7 +343,7 @@ def init(
     reader : str, optional
         Reader of the log, when it is not recognised.
     time_unit : str, optional
-        Unit of a file's time column that states none, such as "ms".
+        Unit of a file's time column that states none, such as "ms"; or the time between two rows, such as "20 ms".
     scale : mapping of str to str, optional
         By column: what one unit of a sensor's voltage, or of any other reading, stands for, as in "30 deg/V"; or texts
         COLUMN=SCALE.

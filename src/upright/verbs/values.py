@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 def open_log(log: Log, reader: str | None = None, time_unit: str | None = None) -> tuple[Record, Path]:
     """Record of a log and the path that it is called by; ``log`` for one that comes from no file.
 
-    A `time_unit` is that of a time column which states none.
+    A `time_unit` is that of a time column which states none, or the time between two rows where there is none.
 
     Raises
     ------
@@ -59,10 +59,10 @@ def open_log(log: Log, reader: str | None = None, time_unit: str | None = None) 
     """
     if isinstance(log, str | os.PathLike):
         from upright.readers import read
-        from upright.study.clock import with_time_unit
+        from upright.study.clock import counts_rows, with_time_unit
 
-        path = Path(log)
-        return with_time_unit(read(path, reader=reader), time_unit or ""), path
+        path, unit = Path(log), time_unit or ""
+        return with_time_unit(read(path, reader=reader, counted=counts_rows(unit)), unit), path
     from upright.records import Record
 
     if not isinstance(log, Record):

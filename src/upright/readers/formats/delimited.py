@@ -24,6 +24,8 @@ from upright.records.columns import stated_time_unit, stated_unit, time_scale
 from upright.records.record import CSV_MARK
 from upright.units import converted
 
+EVENLY = 'as in --time-unit "20 ms" (in a study, time_unit)'
+"""What to try where a log holds no time."""
 _FIRST = 200  # lines that names and remarks may take
 _QUOTED = re.compile(r'"[ \t]*([+-]?)(\d*)([.,]?)(\d*)((?:[eE][+-]?\d+)?)[ \t]*"')
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
@@ -156,10 +158,12 @@ def tabulated(source: Source, given: str | None = None) -> Record:
         notes.append(f"The first column is a clock that counts {text.arrival:g} s, as the times of arrival say.")
     elif not text.named:
         notes.append("The log names no columns; they are called c0, c1, ... and c0 increases, so it is the time.")
+    elif at is None:
+        notes.append("The log holds no time; its rows are counted.")
     elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
         notes.append(f"No column is named like a time; '{text.names[at]}' is the first and increases.")
-    t = converted(table[:, at], seconds)
-    if is_epoch(t) and seconds == 1:
+    t = converted(np.arange(table.shape[0]) if at is None else table[:, at], seconds)
+    if at is not None and is_epoch(t) and seconds == 1:
         rows = [line for line in text.body.split("\n") if line.strip()]
         cells = [row.split(text.delimiter)[at] for row in rows]
         lines = range(text.first_line, text.first_line + len(cells))
@@ -167,14 +171,15 @@ def tabulated(source: Source, given: str | None = None) -> Record:
         notes.append(f"Time is counted from the first sample, epoch {first * 1e-9:.6f} s.")
     source.must_increase(
         t,
-        lambda row: {"line": text.line(row), "column": at + 1, "name": text.names[at]},
+        lambda row: {"line": text.line(row), **({} if at is None else {"column": at + 1, "name": text.names[at]})},
         advice="mend or delete the row, or read each run on its own",
     )
     index = next((table[:, j] for j, name in enumerate(text.names) if is_index(name, table[:, j])), None)
     t, note = rebuild(t, index)
     if given is None and not source.text.endswith("\n") and text.body.rstrip(" "):
         notes.append(_torn(text, table.shape[0]))
-    signals = {name: table[:, j] for j, name in enumerate(text.names) if j != at and not (text.began and j < at)}
+    stamps = range(at or 0) if text.began else ()  # a date in a cell of its own, before the time
+    signals = {name: table[:, j] for j, name in enumerate(text.names) if j != at and j not in stamps}
     return Record(
         t=t,
         signals=signals,
@@ -240,7 +245,8 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return [name.strip() for name in cells]
 
 
-def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
+def _time_column(text: TextTable, table: Array) -> tuple[int | None, float]:
+    """Which column is the time, None where its rows are counted, and the seconds per unit of it."""
     if text.began:
         return int((text.delimiter or " ") in text.began), 1.0  # behind a date in a cell of its own
     if text.arrival:
@@ -249,22 +255,25 @@ def _time_column(text: TextTable, table: Array) -> tuple[int, float]:
         if seconds := time_scale(name):
             return j, seconds
     first = table[:, 0]
+    rising = first.size > 1 and bool((np.diff(first) > 0).all())
+    if text.source.counted and not rising:
+        return None, 1.0
     if text.named and (is_frequency(text.names[0]) or response_columns(text.names)):
         raise text.source.bad(
             f"expected a time column named 't' or 'time', got the frequencies '{text.names[0]}': this is a frequency"
             f" response and no log; `upright frequency` reads it",
             line=text.first_line - 1,
         )
-    if text.named and is_index(text.names[0], first):
+    if text.named and is_index(text.names[0], first) and not text.source.counted:
         raise text.source.bad(
             f"expected a time column named 't' or 'time', got only the sample index '{text.names[0]}';"
-            " add the time of each sample in s",
+            f" add the time of each sample in s, or say what lies between two, {EVENLY}",
             line=text.first_line - 1,
         )
-    if text.named and first.size > 1 and not (np.diff(first) > 0).all():
+    if text.named and first.size > 1 and not rising:
         raise text.source.bad(
             f"expected a time column named 't' or 'time', got: {', '.join(text.names)[:120]};"
-            " name the time column or put it first",
+            f" name the time column, put it first, or say what lies between two rows, {EVENLY}",
             line=max(text.first_line - 1, 1),
         )
     return 0, (stated_time_unit(text.names[0]) if text.named else 0.0) or 1.0

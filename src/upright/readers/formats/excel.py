@@ -52,7 +52,7 @@ def first_sheet(source: Source) -> tuple[str, Source, str]:
         raise source.bad(f"none of its sheets has rows of numbers: {', '.join(sheets)}; name the columns above them")
     name = with_numbers[0]
     others = f", of {', '.join(with_numbers)}" if with_numbers[1:] else ""
-    return name, Source(file=source.file, data=_text(sheets[name]).encode()), f"Sheet '{name}'{others}."
+    return name, replace(source, data=_text(sheets[name]).encode()), f"Sheet '{name}'{others}."
 
 
 def _text(rows: Iterable[tuple[Any, ...]]) -> str:
