@@ -35,10 +35,9 @@ def test_their_loop_has_the_poles_wherever_two_pairs_are_dragged(w1, z1, w2, z2)
     assert np.poly(model.A - model.B @ K) == pytest.approx(np.real(np.poly(pairs)), rel=1e-6, abs=1e-6 * w2**4)
 
 
-def test_poles_that_meet_are_placed_and_what_cannot_be_placed_is_refused():
+def test_poles_that_meet_are_placed_and_what_cannot_be_placed_is_left_to_60_digits_or_refused():
     model = MODELS["furuta"]
     assert swift_gains(model.A, model.B, [-5.0] * 4) == pytest.approx(place(model.A, model.B, [-5.0] * 4).K, rel=1e-9)
     with pytest.raises(BadInput, match="conjugate"):
         swift_gains(model.A, model.B, [-5 + 1j, -5, -6, -7])
-    with pytest.raises(BadInput, match="cannot move"):
-        swift_gains(np.diag([-1.0, 2.0]), [[1.0], [0.0]], [-3.0, -4.0])
+    assert swift_gains(np.diag([-1.0, 2.0]), [[1.0], [0.0]], [-3.0, -4.0]) is None

@@ -43,6 +43,14 @@ def test_a_linear_law_gives_what_follow_gives(name):
         assert np.abs(u).max() == law.limit
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_that_is_given_what_it_has_had_goes_on_with_the_same_bits(name):
+    rows = [(1e-3 * k, tuple(y)) for k, y in enumerate(READINGS.tolist())]
+    once, later = at_work(LAWS[name]), at_work(LAWS[name], rows[:64])
+    u = [once(*row) for row in rows]
+    assert [later(*row) for row in rows[64:]] == u[64:]
+
+
 def test_a_linear_law_gives_what_scipy_gives():
     law = LAWS["filtered differences"]
     step = at_work(law)

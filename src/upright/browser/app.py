@@ -196,8 +196,11 @@ async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None
                 allowed, flooded = allowed - 1.0, False
                 if message.do != "poles":
                     obey(hub.station, who, message)
-                elif placing is None or placing.done():  # takes a while, in which a stop must not wait
-                    placing = asyncio.create_task(_place(hub, who, message, outbox))
+                elif placing is None or placing.done():
+                    try:  # a millisecond, where another thread would be waited for
+                        obey(hub.station, who, ClientRequest(do="poles", fields={**message.fields, "soon": True}))
+                    except TimeoutError:  # takes a while, in which a stop must not wait
+                        placing = asyncio.create_task(_place(hub, who, message, outbox))
                 else:
                     raise BadInput("the last poles are being placed.")
                 wrong = 0.0

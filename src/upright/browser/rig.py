@@ -111,7 +111,7 @@ class BenchRig:
             raise BadInput(f"the law of {self.name} has no filter for its velocities.")
         if not 0.0 <= memory <= LONGEST_MEMORY:
             raise BadInput(f"a filter's a lies from 0 to {LONGEST_MEMORY:g}, got {memory:g}.")
-        loop = _looped(self.model, self.at, _differences(self.model, self.at, memory), self.loop.K, self.follows)
+        loop = _looped(self.model, self.linear, _differences(self.model, self.at, memory), self.loop.K, self.follows)
         path = folder / f"law_{memory:g}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, json.dumps({"law": as_values(loop.law), "basis": self.basis.plain()}).encode())
@@ -127,20 +127,31 @@ class BenchRig:
         linear = self.linear
         return [[z.real, z.imag] for z in np.linalg.eigvals(linear.A - linear.B @ K).tolist()]
 
-    def with_poles(self, poles: Sequence[complex]) -> Loop:
+    def with_poles(self, poles: Sequence[complex], *, soon: bool = False) -> Loop:
         """The loop with the gains that `upright design` has for these poles.
+
+        Parameters
+        ----------
+        soon : bool
+            Whether it is to come within a millisecond, or not at all.
 
         Raises
         ------
         BadInput
             When the law is no state feedback, or the model cannot have these poles.
+        TimeoutError
+            When it would not come so soon.
         """
         if self.loop is None:
             raise BadInput(f"the law of {self.name} is no feedback of states, so that its poles cannot be placed.")
         if any(not p.real < 0 or abs(p) * self.model.period > 1.0 for p in poles):
             raise BadInput(f"poles lie left of 0, within {1 / self.model.period:.4g} 1/s.")
         linear = self.linear
-        return _looped(self.model, self.at, self.loop.estimator, swift_gains(linear.A, linear.B, poles), self.follows)
+        K = swift_gains(linear.A, linear.B, poles)
+        if K is None and soon:
+            raise TimeoutError
+        K = place(linear.A, linear.B, poles).K if K is None else K
+        return _looped(self.model, linear, self.loop.estimator, K, self.follows)
 
     @cached_property
     def scene(self) -> dict[str, Any]:
@@ -264,16 +275,16 @@ def _proposed(rig: BenchRig) -> Loop:
             at=at, period=model.period, speed="filtered", memory=MEMORY, resolution=tuple(model.resolution.tolist()),
             limit=model.saturation, on=model,
         )).continuous  # fmt: skip
-    return _looped(model, at, way, K, follow=True)
+    return _looped(model, linear, way, K, follow=True)
 
 
 def _differences(model: Rig, at: str, memory: float) -> Estimator:
     return filtered(model.linear(at).to_sampled(model.period, model.delay / model.period, model.lag), memory)
 
 
-def _looped(model: Rig, at: str, way: Estimator, K: Array, follow: bool) -> Loop:
+def _looped(model: Rig, linear: StateSpace, way: Estimator, K: Array, follow: bool) -> Loop:
     """Feedback of the states; where it follows, a constant reference moves the driven coordinate there."""
-    linear, k_pf = model.linear(at), 0.0
+    k_pf = 0.0
     if follow:
         moved = [c.name for c in model.plant.coordinates].index(model.plant.inputs[0].on)
         try:

@@ -259,8 +259,8 @@ class Station:
             raise BadInput(f"a tap adds at most {FASTEST:g} to a speed.")
         self._running().tap(names.index(coordinate), speed)
 
-    def poles(self, who: str, poles: Sequence[complex], *, confirm: bool = False) -> None:
-        """Ask for other gains, which the loop's supervisor accepts or refuses."""
+    def poles(self, who: str, poles: Sequence[complex], *, confirm: bool = False, soon: bool = False) -> None:
+        """Ask for other gains, which the loop's supervisor accepts or refuses; see `BenchRig.with_poles`."""
         self._operated(who)
         if self.rig.kind == HARDWARE and not confirm:
             raise BadInput("this changes what drives a rig that can really move; confirm it.")
@@ -269,7 +269,7 @@ class Station:
         desk = self._running()
         if self.origin != HELD:
             raise BadInput(f"{OTHERS[self.origin]} no feedback of states alone; its poles stay as they are.")
-        loop = self.rig.with_poles(poles)
+        loop = self.rig.with_poles(poles, soon=soon)
         if not desk.change(loop.law):
             raise BadInput("the last change is not answered yet.")
         self.requested = loop

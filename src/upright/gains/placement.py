@@ -182,10 +182,11 @@ def place(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Placement:
     )
 
 
-def swift_gains(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Array:
+def swift_gains(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Array | None:
     """The gains of `place` for one input while a slider moves: Ackermann's formula in double precision.
 
-    The poles are computed again from the gains; where they miss, `place` answers or refuses in its 60 digits.
+    The poles are computed again from the gains; None where they miss, which `place` answers or refuses in its 60
+    digits.
     """
     A, B = checked(A, B)
     requested = conjugate_poles(poles, len(A))
@@ -200,7 +201,7 @@ def swift_gains(A: ArrayLike, B: ArrayLike, poles: ArrayLike) -> Array:
             attained = matched(requested, np.linalg.eigvals(A - B @ K).astype(np.complex128))
             if (np.abs(attained - requested) <= _allowed(requested)).all():
                 return K
-    return place(A, B, poles).K
+    return None
 
 
 def _balanced(A: Array, B: Array) -> _Balanced:

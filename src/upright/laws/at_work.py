@@ -8,6 +8,7 @@ compiled kernel and in what `upright export` writes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from math import floor, isfinite, nan
 from typing import Any
 
@@ -25,8 +26,8 @@ left by 1e-19."""
 _TERMS = 50  # Python's compiler goes as deep as an expression is long
 
 
-def at_work(law: Law | Rule) -> AtWork:
-    """The law from its first sample on, one call for each.
+def at_work(law: Law | Rule, before: Sequence[tuple[float, Sequence[float]]] = ()) -> AtWork:
+    """The law from its first sample on, one call for each; `before` are times and readings that it has had already.
 
     Commands are rounded and limited as the law says; its `delay` is left to the computer and the converter that have
     it, and its `resolution` to the encoders.
@@ -41,7 +42,7 @@ def at_work(law: Law | Rule) -> AtWork:
     """
     if any(width > 1 for width in law.widths().values()):
         raise BadInput("a law at work has one lane; take it from those it has with of_lanes(slice(k, k + 1)).")
-    running = _linear(law) if isinstance(law, Law) else _function(law)
+    running = _linear(law, before) if isinstance(law, Law) else _function(law)
     stopped = False
 
     def step(t: float, y: Sequence[float]) -> Numbers:
@@ -53,10 +54,12 @@ def at_work(law: Law | Rule) -> AtWork:
             u, stopped = (nan,) * (len(law.D) if isinstance(law, Law) else law.commands(len(y))), True
         return (nan,) * len(u) if stopped else u
 
+    for t, y in before if isinstance(law, Rule) else ():
+        step(t, y)
     return step
 
 
-def _linear(law: Law) -> AtWork:
+def _linear(law: Law, before: Sequence[tuple[float, Sequence[float]]]) -> AtWork:
     a, b, c, d = (getattr(law, name).reshape(getattr(law, name).shape[:2]).tolist() for name in "ABCD")
     command, after = _sums(c, d), _sums(a, b)
     numbers = {name: _row(values[:, 0]) for name, values in law.by_lane(1).items() if name in ("initial", "target")}
@@ -77,6 +80,11 @@ def _linear(law: Law) -> AtWork:
         k += 1
         return u
 
+    for t, y in before:
+        if any(held) or begin is not None:
+            step(t, y)
+        else:  # what it commanded meanwhile changes none of its memories, and other gains come between two ticks
+            z, k = after(z, (*(y[i] - target[i] for i in range(n)), *referred(k))), k + 1
     return step
 
 
@@ -89,8 +97,14 @@ def _sums(of: list[list[float]], to: list[list[float]]) -> Callable[[Numbers, Nu
         lines += [f"    u{i} = 0.0"]
         lines += [f"    u{i} = u{i} + {' + '.join(terms[j : j + _TERMS])}" for j in range(0, len(terms), _TERMS)]
     lines += [f"    return ({'u%d, ' * len(of) % tuple(range(len(of)))})"]
+    return _compiled("\n".join(["def sums(z, w):", *lines]))
+
+
+@lru_cache(maxsize=64)
+def _compiled(text: str) -> Callable[[Numbers, Numbers], Numbers]:
+    """The function of a text; kept, since other gains leave the memories' sums as they are."""
     space: dict[str, Any] = {}
-    exec("\n".join(["def sums(z, w):", *lines]), space)
+    exec(text, space)
     return space["sums"]
 
 

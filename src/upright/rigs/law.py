@@ -6,12 +6,14 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from upright.errors import BadInput
 from upright.laws import Law, Rule, at_work
 from upright.laws.at_work import RECENT
+from upright.records import Array
 from upright.rigs.onboard import MEMORIES
 from upright.rigs.protocol import Capabilities, Limits
 
@@ -59,8 +61,9 @@ class RunningLaw:
     The references are readings of their own here, so that whoever runs the loop can change them.
     """
 
-    def __init__(self, law: Law | Rule, period: float) -> None:
-        self.period, self.ticks = period, 0
+    def __init__(self, law: Law | Rule, period: float, *, after: RunningLaw | None = None) -> None:
+        recent = () if after is None else tuple(after._recent)
+        self.period, self.ticks = period, 0 if after is None else after.ticks - len(recent)
         self.references: tuple[float, ...] = ()  # at the tick that was answered last
         self._signal: list[list[float]] = law.signal().tolist()
         self._own = isinstance(law, Rule)
@@ -70,7 +73,7 @@ class RunningLaw:
             begin = None if law.begin is None else np.hstack([law.begin, np.zeros((len(law.begin), m))])
             target = np.append(np.broadcast_to(np.asarray(law.target, dtype=np.float64), (n,)), np.zeros(m))
             law = replace(law, references=None, reference_names=(), measured=(), target=target, begin=begin)
-        self._step = at_work(law)
+        self._step = at_work(law, [self._heard(*had) for had in recent])
 
     @property
     def followed(self) -> float:
@@ -89,22 +92,23 @@ class RunningLaw:
         time : float, optional
             Since the first tick [s]; so many periods as ticks have passed when omitted.
         """
+        return self._step(*self._heard(readings, reference, time))[0]
+
+    def _heard(
+        self, readings: Sequence[float], reference: float | None, time: float | None
+    ) -> tuple[float, Sequence[float]]:
+        """Time and inputs of the next tick."""
         row = list(self._signal[min(self.ticks, len(self._signal) - 1)])
         if reference is not None and row:
             row[0] = reference
         self.references = tuple(row)
         self._recent.append((readings, reference, time))
-        inputs = readings if self._own else (*readings, *row)
         self.ticks += 1
-        return self._step((self.ticks - 1) * self.period if time is None else time, inputs)[0]
+        return (self.ticks - 1) * self.period if time is None else time, readings if self._own else (*readings, *row)
 
     def going_on(self, law: Law | Rule) -> RunningLaw:
         """Another law in the place of this one, that remembers the last `RECENT` readings as if it had read them."""
-        other = RunningLaw(law, self.period)
-        other.ticks = self.ticks - len(self._recent)
-        for readings, reference, time in self._recent:
-            other.step(readings, reference, time)
-        return other
+        return RunningLaw(law, self.period, after=self)
 
 
 def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
@@ -143,11 +147,20 @@ def absurdity(law: Law | Rule, about: Capabilities, limits: Limits) -> str:
 def _step(law: Law, readings: int) -> list[float]:
     """Largest command within `STEP_SAMPLES` after each reading has gone from 0 to 1, from memories at zero."""
     A, B, C, D = (m.reshape(m.shape[:2]) for m in (law.A, law.B, law.C, law.D))
-    z, most = np.zeros((len(A), readings)), np.zeros(readings)
-    for _ in range(STEP_SAMPLES + 1):
-        most = np.maximum(most, np.abs((C @ z + D[:, :readings])[0]))
-        z = A @ z + B[:, :readings]
-    return most.tolist()
+    memories = _filled(A.tobytes(), B[:, :readings].tobytes(), len(A))
+    u = np.einsum("i,kij->kj", C[0], memories) + D[0, :readings]
+    return np.abs(u).max(axis=0).tolist()
+
+
+@lru_cache(maxsize=8)
+def _filled(A: bytes, B: bytes, n: int) -> Array:
+    """Memories at each sample of a step, shape (STEP_SAMPLES + 1, n, readings); kept, since other gains leave them."""
+    a, b = np.frombuffer(A).reshape(n, n), np.frombuffer(B)
+    b = b.reshape(n, -1) if n else b.reshape(0, 1)
+    z = np.zeros((STEP_SAMPLES + 1, *b.shape))
+    for k in range(STEP_SAMPLES):
+        z[k + 1] = a @ z[k] + b
+    return z
 
 
 def _impulse(law: Law, readings: int) -> Iterator[list[float]]:
