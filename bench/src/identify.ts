@@ -6,6 +6,7 @@ import { type Curve, drawCurves } from "./curves";
 import { byId, italic, make, say } from "./dom";
 import { Recording } from "./recording";
 import type { Session } from "./session";
+import { Weighing } from "./weighing";
 import { short, shownUnit, signed, symbol } from "./words";
 
 interface Log {
@@ -89,13 +90,17 @@ export class Identify {
   private timer = 0;
   private busy = "";
   private readonly recording: Recording;
+  private readonly weighing: Weighing;
   /** Whether a recording is shown, and not a fit; undefined until it is known whether there is one. */
   private recorded: boolean | undefined;
+  /** Whether a weighing is shown. */
+  private weighed = false;
 
   /** `chosen`: another fit is shown. */
   constructor(private readonly session: Session, record: () => void, private readonly chosen: () => void) {
     this.address = `/api/rigs/${encodeURIComponent(session.name)}`;
     this.recording = new Recording(this.address, `/rigs/${encodeURIComponent(session.name)}/runs`);
+    this.weighing = new Weighing(this.address);
     const press = (id: string, act: () => void) =>
       byId(id).addEventListener("click", ({ currentTarget }) => {
         const why = (currentTarget as HTMLElement).dataset["why"];
@@ -107,6 +112,7 @@ export class Identify {
     press("fit-report", () => this.report());
     press("fit-motions", record);
     for (const from of ["sweep", "step"] as const) press(`record-${from}`, () => session.steer({ do: "start", from }));
+    press("weigh", () => void this.weigh());
     press("fit-again", () => void this.again());
     byId("fit-log").addEventListener("change", () => this.about());
     byId("fit-file").addEventListener("change", ({ currentTarget }) => {
@@ -114,7 +120,7 @@ export class Identify {
       if (file) void this.bring(file).finally(() => (input.value = ""));
     });
     byId("fit-list").addEventListener("change", () => {
-      this.recorded = false;
+      this.recorded = this.weighed = false;
       void this.open(byId<HTMLSelectElement>("fit-list").value);
     });
     byId<HTMLIFrameElement>("fit-frame").addEventListener("load", ({ currentTarget }) => {
@@ -125,6 +131,7 @@ export class Identify {
     const redraw = () => {
       this.draw();
       this.recording.draw();
+      this.weighing.draw();
     };
     addEventListener("resize", redraw);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
@@ -145,7 +152,8 @@ export class Identify {
     clearTimeout(this.timer);
     const answer = await fetch(`${this.address}/fits`).catch(() => undefined);
     const before = this.identified;
-    if (this.records) this.recorded = true;
+    if (this.records) [this.recorded, this.weighed] = [true, false];
+    if (this.weighed) await this.weighing.look();
     if (this.recorded === undefined) this.recorded = await this.recording.look();
     else if (this.records || !this.recording.over) await this.recording.look();
     if (answer?.ok) {
@@ -158,7 +166,7 @@ export class Identify {
     }
     this.state();
     clearTimeout(this.timer);
-    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now || this.records || !this.recording.over ? SOON : LATER);
+    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now || this.records || !this.recording.over || (this.weighed && !this.weighing.over) ? SOON : LATER);
   }
 
   /** What may be pressed now. */
@@ -170,12 +178,14 @@ export class Identify {
     byId("fit-interrupt").hidden = !now;
     byId("fit-begin").hidden = !!now;
     lock(byId("fit-interrupt"), session.unsteerable);
+    lock(byId("weigh"), session.unsteerable || (this.weighed && !this.weighing.over ? "It is being weighed." : ""));
     lock(byId("fit-again"), session.unsteerable || busy || (now ? "A log is being identified." : ""));
     byId<HTMLInputElement>("fit-file").disabled = session.unsteerable !== "" || busy !== "";
     byId("fit-going").hidden = !now;
     byId("fit-live").hidden = !now || this.picture?.id !== now.id;
-    byId("record-live").hidden = !this.recorded || !!now;
-    byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden || !byId("record-live").hidden;
+    byId("weigh-live").hidden = !this.weighed || !!now || !this.weighing.there;
+    byId("record-live").hidden = !this.recorded || !!now || !byId("weigh-live").hidden;
+    byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden || !byId("record-live").hidden || !byId("weigh-live").hidden;
     if (now) {
       say(byId("fit-step"), `${now.step}, ${now.seconds.toFixed(0)} s`);
       this.say(`Identifying ${now.name}.`);
@@ -260,11 +270,18 @@ export class Identify {
     await this.show();
   }
 
+  private async weigh(): Promise<void> {
+    if (!(await this.order("POST", "weighing"))) return;
+    this.weighed = true;
+    this.weighing.begin();
+    await this.show();
+  }
+
   private async begin(): Promise<void> {
     const log = byId<HTMLSelectElement>("fit-log").value, own = byId("fit-kind").hidden;
     const of = own ? "rig" : byId<HTMLSelectElement>("fit-of").value;
     if (!(await this.order("POST", "fits", JSON.stringify({ log, of })))) return;
-    this.recorded = false;
+    this.recorded = this.weighed = false;
     await this.show();
   }
 
@@ -342,6 +359,7 @@ export class Identify {
   opened(): void {
     this.draw();
     this.recording.draw();
+    this.weighing.draw();
     void this.show();
   }
 

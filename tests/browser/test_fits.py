@@ -163,7 +163,7 @@ def test_only_the_operator_at_a_page_of_this_bench_brings_and_identifies(bench):
             assert ask(bench, path, first.me, method, **{"Sec-Fetch-Site": "cross-site"})[0] == 403
         assert ask(bench, fits, first.me, "DELETE")[2] == "Nothing is being identified."
     assert json.loads(got(bench, fits)[2]) == {"logs": [], "now": None, "failed": "", "fits": []}
-    for path in ("fits/now", "recording"):
+    for path in ("fits/now", "recording", "weighing"):
         assert got(bench, f"api/rigs/furuta/{path}")[::2] == (200, "null")
 
 

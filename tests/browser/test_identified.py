@@ -201,7 +201,7 @@ def test_first_motions_are_recorded_and_identified_by_mouse_and_a_fit_can_be_int
         assert one.wrong == []
 
 
-def test_a_sweep_and_a_step_are_drawn_as_they_are_recorded_and_stop_as_every_run_does(server, chromium):
+def test_a_sweep_a_step_and_a_weighing_are_drawn_as_they_come_and_stop_as_every_run_does(server, chromium):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with student(chromium, server, screen="identify") as one:
         page = one.page
@@ -216,7 +216,12 @@ def test_a_sweep_and_a_step_are_drawn_as_they_are_recorded_and_stop_as_every_run
         assert page.locator("#record-pictures canvas").count() == 2
         page.click("#end")
         one.reads("#record-says", "kept as a run")
-        assert axe.Axe().run(page).response["violations"] == []
+        violations = axe.Axe().run(page).response["violations"]
+        page.click("#weigh")
+        one.reads("#weigh-says", "A line explains all 5 loadings")
+        one.reads("#weigh-rows", "stiffness of the spring2\\.\\d+ ±")
+        one.reads("#weigh-title", "SIMULATED")
+        assert violations + axe.Axe().run(page).response["violations"] == []
         one.leaves()
         assert one.wrong == []
         assert one.foreign(server) == []

@@ -15,6 +15,7 @@ from upright.browser.answers import sentence_of
 from upright.browser.identify.bounded import Bounded
 from upright.browser.identify.fitted import fitted_rig
 from upright.browser.identify.tasks import begin_identification, begin_inspection
+from upright.browser.identify.weighing import BodyWeighing
 from upright.browser.rig import BenchRig
 from upright.browser.runs import listed
 from upright.errors import BadInput, UprightError
@@ -51,6 +52,7 @@ class Identifications:
         self._now: Facts | None = None
         self._failed = ""
         self._picture: Facts = {}
+        self.weighing = BodyWeighing(carry)
 
     def keep(self, name: str, data: bytes) -> Facts:
         """Keep a log, once a reader has read it.
@@ -189,6 +191,7 @@ class Identifications:
 
     def close(self) -> None:
         """End what is on its way."""
+        self.weighing.close()
         if self._job is not None:
             self._job.kill()
 

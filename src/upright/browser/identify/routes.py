@@ -87,6 +87,16 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         own.interrupt()
         return JSONResponse({})
 
+    async def weigh(request: Request, own: Identifications) -> Response:
+        if fixed:
+            raise BadInput("in a class nobody's masses are unbolted; upright loadings weighs a twin of such a rig.")
+        own.weighing.begin(hubs[request.path_params["name"]].station.rig)
+        return JSONResponse({})
+
+    async def weighed(request: Request) -> Response:
+        own = fits.get(request.path_params["name"])
+        return nothing() if own is None else JSONResponse(own.weighing.described())
+
     async def adopt(request: Request, own: Identifications) -> Response:
         key, memory = _model_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
         if fixed:
@@ -105,6 +115,8 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         Route("/api/rigs/{name}/fits", described, methods=["GET"]),
         Route("/api/rigs/{name}/fits/now", picture, methods=["GET"]),
         Route("/api/rigs/{name}/recording", recorded, methods=["GET"]),
+        Route("/api/rigs/{name}/weighing", weighed, methods=["GET"]),
+        Route("/api/rigs/{name}/weighing", for_operator(weigh), methods=["POST"]),
         Route("/api/rigs/{name}/fits", for_operator(begin), methods=["POST"]),
         Route("/api/rigs/{name}/fits", for_operator(interrupt), methods=["DELETE"]),
         Route("/api/rigs/{name}/logs", for_operator(bring), methods=["POST"]),

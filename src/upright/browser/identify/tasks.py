@@ -17,3 +17,10 @@ def begin_identification(*arguments: Any) -> str:
     from upright.browser.identify import work
 
     return work.identify_log(*arguments)
+
+
+def begin_weighing(*arguments: Any) -> str:
+    """See `weighed.weigh_body`."""
+    from upright.browser.identify import weighed
+
+    return weighed.weigh_body(*arguments)
