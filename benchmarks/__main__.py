@@ -27,10 +27,10 @@ NAMES = (
     "trajectory", "ensemble", "fit", "nist", "coverage", "loadings", "frequency", "swing_up", "tracking", "lab",
     "doctor", "rigs", "misfit", "verdicts", "regulation", "real", "agree", "bands", "starts", "startup",
     "workers", "long", "gpu", "crash", "safety", "dying", "false_stops", "minute", "images", "soak", "jitter", "gym",
-    "at_hand", "quick_lab", "first", "kept", "strangers", "live", "bench", "peers", "mutants",
+    "at_hand", "quick_lab", "first", "kept", "strangers", "live", "bench", "bench_soak", "peers", "mutants",
 )  # fmt: skip
-APART = ("peers", "mutants")
-"""Those that run when they are named, and never among all: what is asked there is not how fast we are."""
+APART = ("bench_soak", "peers", "mutants")
+"""Those that run when they are named, and never among all: what is asked there is not how fast we are, or lasts."""
 PUBLISHED = (
     "first", "kept", "strangers", "real", "agree", "bands", "rigs", "misfit", "verdicts", "regulation", "workers",
     "starts", "crash", "safety", "dying", "false_stops", "quick_lab", "soak", "jitter", "gym", "peers", "mutants",

@@ -19,7 +19,7 @@ from benchmarks.measure import Line
 
 TIMED = (
     "trajectory", "ensemble", "fit", "nist", "lab", "startup", "workers", "long", "gpu", "jitter", "dying", "gym",
-    "live", "bench", "crash",
+    "live", "bench", "bench_soak", "crash",
 )  # fmt: skip
 """Those whose figures are of a clock: nothing else runs beside them."""
 
