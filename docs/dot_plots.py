@@ -13,6 +13,7 @@ from upright.report.drawing import CYCLE, GREY, figure, save, styled
 
 _NUMBER = r"([\d.]+)"
 _AFTER = rf"{_NUMBER} s, {_NUMBER}"
+_POSITIVE = rf"(?:^|/ ){_NUMBER}"
 _MARKS = "osD^"
 _APART = 0.2
 """Between two series of one row, so that neither hides the other [rows]."""
@@ -149,8 +150,13 @@ SHOWN: Mapping[str, Shown] = {
         targets={"target": 90.0},
     ),
     "peers": Shown(
-        label="of runs that no fit has seen, explained [%]",
-        series={"uw, tail": Cell(), "aau, tail": Cell(at=1), "aau, restarted": Cell(at=2)},
+        label="of runs that no fit has seen, explained, where that is above 0 [%]",
+        series={
+            "uw, tail": Cell(pattern=_POSITIVE),
+            "aau, tail": Cell(at=1, pattern=_POSITIVE),
+            "aau, restarted": Cell(at=2, pattern=_POSITIVE),
+            "macstepien": Cell(at=3, pattern=_POSITIVE),
+        },
     ),
     "quick_lab": Shown(
         label="farthest that the driven body went, of its travel [%]",

@@ -18,7 +18,7 @@ from benchmarks.peers.task import Answer, Task, spent
 
 Array = NDArray[np.float64]
 
-NODES, ITERATIONS = 8000, 300
+NODES, ITERATIONS = 40000, 300
 """Nodes at most, beyond which every second, third, ... sample is one; and steps of IPOPT."""
 
 
