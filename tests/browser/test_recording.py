@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,11 @@ from upright.experiments.frequency_1b.one_by_one import stepped_sines
 from upright.experiments.stand.live import live_stand
 from upright.experiments.stand.twin import TwinStand
 from upright.identification.frequency.response import FrequencyResponse
-from upright.realtime.desk import ROW, ROWS
+from upright.logs import read_log
+from upright.realtime.desk import ROW, ROWS, Desk
+from upright.realtime.process import run_in_process
 from upright.rig.makes import make_rig
+from upright.running.run import prepared
 
 
 class Played:
@@ -26,8 +30,9 @@ class Played:
     def __init__(self, y, u, per_unit, lost=()):
         self.rows = np.zeros(len(u), dtype=ROW)
         self.rows["number"] = self.rows["again"] = np.arange(len(u))
-        self.rows["counts"][:, : y.shape[1]] = np.round(y * np.abs(per_unit))
-        self.rows["applied"], self.lost, self.over = u, lost, threading.Event()
+        self.rows["counts"][:-1, : y.shape[1]] = np.round(y[1:] * np.abs(per_unit))
+        self.rows["applied"] = u
+        self.lost, self.over = lost, threading.Event()
 
     def since(self, number):
         head = min(number + ROWS // 2, len(self.rows))
@@ -80,6 +85,19 @@ def test_of_a_sweep_each_point_is_the_line_of_a_fourier_transform_and_what_was_l
     assert stored.omega == pytest.approx([p["omega"] for p in drawn["points"]])
     assert stored.magnitude_dB == pytest.approx(np.array([p["dB"] for p in drawn["points"]]), abs=1e-3)
     assert len(missed) == 1
+
+
+def test_a_run_shows_each_command_with_the_readings_after_it_and_its_log_with_those_before(rig, tmp_path):
+    request = Recording(rig, ONE_STEP).request
+    run, desk = prepared(replace(request, seconds=1.2), tmp_path), Desk()
+    run_in_process(run.order, paced=False, desk=desk)
+    _, rows = desk.since(0)
+    log = read_log(run.order.log).columns
+    assert np.ptp(log["u_applied"]) > 0.1
+    assert np.array_equal(rows["applied"], log["u_applied"])
+    for k, name in enumerate(("psi", "theta")):
+        assert np.ptp(log[f"{name}_counts"]) > 10
+        assert np.array_equal(np.abs(rows["counts"][:-1, k]), np.abs(log[f"{name}_counts"][1:]))
 
 
 def test_of_a_step_everything_is_drawn_beside_what_the_model_would_show_and_its_swing_is_read(

@@ -157,12 +157,15 @@ class Recording:
 
     def _take(self, desk: Samples) -> None:
         self._next, rows = desk.since(self._next)
-        rows = rows[rows["number"] < self._u.size]
+        rows = rows[rows["number"] < self._u.size - 1]
         if not len(rows):
             return
         at, n = rows["number"], self._y.shape[1]
-        self._y[at] = rows["counts"][:, :n] / np.abs(np.array(self._rig.per_unit))
+        # a tick's command stands with the readings after it; the log has it beside those that it answers
+        self._y[at + 1] = rows["counts"][:, :n] / np.abs(np.array(self._rig.per_unit))
         self._u[at] = rows["applied"]
+        if at[0] == 0:
+            self._y[0] = self._y[1]  # at rest
         came = int(at[-1]) + 1
         if isinstance(self._plan, SteppedSines):
             self._measure(self._plan, came)
