@@ -154,7 +154,7 @@ def chain(plant: str = "rectilinear-2", names: tuple[str, ...] = ("x_1", "x_2"),
           **more: Any) -> ChainLog:  # fmt: skip
     of = dict(zip(names, columns(guess).values(), strict=False))
     found = Recognised(
-        plant=plant, columns=of, rest=dict.fromkeys(of, 0.0), drive=drive, reversed=reversed_, mirrored=False,
+        plant=plant, columns=of, rest=dict.fromkeys(of, 0.0), drive=drive, reversed=reversed_, throw=0.0,
         window=windows[0], frequency=0.0, settled=True, doubts=("first",),
     )  # fmt: skip
     about: dict[str, Any] = {"held": (), "locked": (), "reference": None, "loop": ""}

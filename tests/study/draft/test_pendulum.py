@@ -191,7 +191,7 @@ def guessed_gain(plant, guess="rad", low=-0.3, high=0.3, frequency=5.0, command=
     """Gain that a draft begins with, of a coordinate and a command that go so far."""
     column, drive = col("q", guess, low=low, high=high), col("u", **(command or {"low": -2.0, "high": 1.5}))
     return _gain(Recognised(
-        plant=plant, columns={"q": column}, rest={"q": 0.0}, drive=drive, reversed=False, mirrored=False,
+        plant=plant, columns={"q": column}, rest={"q": 0.0}, drive=drive, reversed=False, throw=0.0,
         window=(0.0, 1.0), frequency=frequency, settled=True, doubts=(),
     ))  # fmt: skip
 
@@ -298,7 +298,7 @@ class Spring(Plant):
 
 
 def swinging(w: float) -> Recognised:
-    return Recognised(plant="own", columns={}, rest={}, drive=None, reversed=False, mirrored=False,
+    return Recognised(plant="own", columns={}, rest={}, drive=None, reversed=False, throw=0.0,
                       window=(0.0, 9.0), frequency=w, settled=True, doubts=())  # fmt: skip
 
 

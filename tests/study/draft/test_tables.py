@@ -120,7 +120,7 @@ def test_runs_have_their_window_and_a_rig_its_coarser_period():
 
 def shown(plant: str, columns: dict[str, Column], **more: Any) -> Recognised:
     about: dict[str, Any] = {
-        "rest": dict.fromkeys(columns, 0.0), "drive": None, "reversed": False, "mirrored": False, "window": (1.0, 5.0),
+        "rest": dict.fromkeys(columns, 0.0), "drive": None, "reversed": False, "throw": 0.0, "window": (1.0, 5.0),
         "frequency": 5.0, "settled": False, "doubts": (),
     }  # fmt: skip
     return Recognised(plant=plant, columns=columns, **(about | more))
@@ -172,13 +172,14 @@ def test_the_tail_of_more_than_twelve_free_swings_is_kept_for_prediction(stop, r
 
 
 def test_a_driven_cart_pendulum_starts_from_a_gain_that_moves_it_as_far():
-    found = shown("cart-pendulum", {"x": CART, "theta": PENDULUM}, drive=U, settled=True, reversed=True, mirrored=True)
+    found = shown("cart-pendulum", {"x": CART, "theta": PENDULUM}, drive=U, settled=True, reversed=True, throw=-0.8)
     study = drafted(found)
     given = study["parameters"]
     assert {n: v["value"] for n, v in given.items() if "value" in v} == {
-        "m_p": "0.1 kg", "J_p": "0 kg m^2", "m_c": "1 kg",
+        "m_p": "0.1 kg", "J_p": "0 kg m^2",
     }  # fmt: skip
     assert {n: v["guess"] for n, v in given.items() if "guess" in v} == {
+        "m_c": "1 kg",
         "l_cg": f"{L:.3g} m", "b_2": f"{0.002 * 5 * 0.1 * L**2:.3g} N m s/rad",
         "b_2c": f"{0.001 * 9.81 * 0.1 * L:.3g} N m",
         "b_1": "1.1 N s/m", "b_1c": "0.11 N",
@@ -205,8 +206,11 @@ def test_an_arm_is_held_where_nothing_says_what_drove_it():
     study = drafted(shown("furuta", {"psi": ARM, "theta": PENDULUM}))
     given = study["parameters"]
     assert {n: v["value"] for n, v in given.items() if "value" in v} == {
-        "m_p": "0.1 kg", "J_p": "0 kg m^2", "r": "0.1 m", "J_d": "0.001 kg m^2",
+        "m_p": "0.1 kg", "J_p": "0 kg m^2", "J_d": "0.001 kg m^2",
     }  # fmt: skip
+    assert given["r"] == {"guess": "0.1 m"}
+    thrown = drafted(shown("furuta", {"psi": ARM, "theta": PENDULUM}, throw=-0.8))
+    assert thrown["parameters"]["r"] == {"guess": f"{0.8 * L:.3g} m"}  # its hinge's acceleration is r psi''
     assert "b_1" not in given
     assert study["defaults"] == {"held": ["psi"], "unknown": ["initial", "offset"]}
     driven = drafted(shown("furuta", {"psi": ARM, "theta": PENDULUM}, drive=U))
@@ -219,7 +223,7 @@ def test_an_arm_is_held_where_nothing_says_what_drove_it():
     assert "held" not in driven["defaults"]
     locked = drafted(shown("furuta", {"theta": PENDULUM}))
     assert locked["defaults"] == {"locked": ["psi"], "unknown": ["initial", "offset"]}
-    assert "J_d" in {n for n, v in locked["parameters"].items() if v.get("assumed")}
+    assert {"J_d", "r"} <= {n for n, v in locked["parameters"].items() if v.get("assumed")}
     alone = drafted(shown("furuta", {"theta": PENDULUM}, drive=U))
     assert "b_1" not in alone["parameters"]
 

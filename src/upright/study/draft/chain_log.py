@@ -145,7 +145,7 @@ def read_chain(
     }
     recognised = replace(
         recognised, plant=plant, columns=dict(zip(names, columns, strict=True)), rest=rest, drive=drive,
-        reversed=reversed_, mirrored=False, window=windows[0], doubts=(*stated, *doubts),
+        reversed=reversed_, throw=0.0, window=windows[0], doubts=(*stated, *doubts),
     )  # fmt: skip
     return ChainLog(
         recognised=recognised, held=held, locked=locked, reference=reference, loop=loop, windows=tuple(windows),

@@ -159,7 +159,7 @@ def recognised_upright(recognised: Recognised, balanced: Balanced) -> Recognised
     scale = _si(recognised.columns[last].guess)
     zero = (balanced.centre + (math.pi if mirrored else -math.pi)) / scale
     return replace(
-        recognised, reversed=balanced.pull < 0, mirrored=mirrored, rest={**recognised.rest, last: zero},
+        recognised, reversed=balanced.pull < 0, throw=balanced.throw, rest={**recognised.rest, last: zero},
         window=recognised.window, frequency=balanced.rate,
         doubts=(*recognised.doubts, "The pendulum falls away from where it is kept: it was taken for balanced upright,"
                 " and is predicted 50 and 200 ms ahead.") ,
@@ -188,11 +188,19 @@ def starts_hanging(recognised: Recognised, plant: type[Plant]) -> PendulumStarts
     if recognised.plant in ("cart-pendulum", "furuta"):
         assumed["m_p"] = (MASS, assumed["m_p"][1])
         guesses = {"l_cg": length, "b_2": 0.002 * w * MASS * length**2, "b_2c": 0.001 * G * MASS * length}
-        driven = recognised.drive is not None and plant.coordinates[0].name in recognised.columns
+        moves = plant.coordinates[0].name in recognised.columns
+        driven = recognised.drive is not None and moves
+        # one mass sets the scale of all forces; what the pendulum does to what carries it tells the rest
         if recognised.plant == "cart-pendulum":
-            assumed["m_c"] = (1.0, "MEASURE")
+            if driven:
+                guesses["m_c"] = 1.0
+            else:
+                assumed["m_c"] = (1.0, "MEASURE; not seen while the cart is held or locked")
         else:
-            assumed["r"] = (0.1, "MEASURE")
+            if moves:
+                guesses["r"] = min(max(abs(recognised.throw) * length, 0.02), 2.0) if recognised.throw else 0.1
+            else:
+                assumed["r"] = (0.1, "MEASURE; not seen while the arm is locked")
             if driven:
                 guesses["J_d"] = 1e-3
             else:

@@ -50,8 +50,9 @@ class Recognised:
         What commands the rig.
     reversed : bool
         Whether a positive command first moves the driven column down.
-    mirrored : bool
-        Whether the pendulum's column counts against the coordinate, judged by how the hinge's motion throws it.
+    throw : float
+        Acceleration of the hanging pendulum per that of its hinge, negative where its column counts against the
+        coordinate; 0 where the data do not tell.
     window : tuple of float
         Where something happens [s].
     frequency : float
@@ -71,13 +72,18 @@ class Recognised:
     rest: dict[str, float]
     drive: Column | None
     reversed: bool
-    mirrored: bool
+    throw: float
     window: tuple[float, float]
     frequency: float
     settled: bool
     doubts: tuple[str, ...]
     earlier: tuple[tuple[float, float], ...] = ()
     accelerates: bool = False
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the pendulum's column counts against the coordinate, judged by how the hinge's motion throws it."""
+        return self.throw < 0
 
 
 def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recognised:
@@ -139,18 +145,18 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         if len(swings) > 1:  # a hand has brought it back
             window, earlier = swings[-1], tuple(swings[:-1])
         inside = (record.t >= window[0]) & (record.t <= window[1])
-    mirrored = False
+    throw = 0.0
     if pushed and all(c.guess in ANGLES or name == "x" for name, c in columns.items()):
         first, hanging = (_SI.get(c.guess, 1.0) for c in columns.values())
         angle = hanging * (last[inside] - centre)
-        mirrored = coupling(find(plant), record.t[inside], first * driven[inside], angle) < 0
+        throw = coupling(find(plant), record.t[inside], first * driven[inside], angle)
     return Recognised(
         plant=plant,
         columns=columns,
         rest=rest,
         drive=drive,
         reversed=drive is not None and moves_against(record.t, record[drive.name], pushed_column),
-        mirrored=mirrored,
+        throw=throw,
         window=window,
         frequency=swing_frequency(record.t[inside], last[inside] - centre),
         settled=bool(inspection.rests) or (drive is not None and _starts_still(last, record[drive.name])),
