@@ -161,8 +161,9 @@ class Station:
         self._operated(who)
         with self._lock:
             self.at_rest()
+            if rig.model is not self.rig.model:  # its swing-up is another one
+                self.hanging, self._held_by, self._designer = NOT_DESIGNED, None, None
             self.rig, self.loop, self.requested, self.origin = rig, rig.loop, None, HELD
-            self.hanging, self._held_by, self._designer = NOT_DESIGNED, None, None
 
     def start(
         self, who: str, *, seconds: float = USUAL, start: Sequence[float] = (), accept: str = "", origin: str = HELD
@@ -315,7 +316,7 @@ class Station:
         except RuntimeError as error:  # its process was killed, as with the bench that closes meanwhile
             why = f"Its swing-up was not designed: {error}."
         with self._lock:
-            if rig is self.rig:  # a design takes seconds, in which another description may have come
+            if rig.model is self.rig.model:  # a design takes seconds, in which another description may have come
                 self._held_by, self.hanging = gains, why
 
     def _operated(self, who: str) -> None:
