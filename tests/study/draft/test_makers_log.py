@@ -44,7 +44,8 @@ def test_the_draft_is_of_a_furuta_pendulum_whose_duty_is_no_voltage(folder):
 def test_before_anything_is_measured_the_fit_says_no_and_where_to_look(folder):
     fit = up.identify(folder / "study.toml").value
     assert not fit.trusted
-    assert any("Look first at sensors.psi.counts_per_rev, which is assumed" in w for w in fit.warnings)
+    assert "rests on sensors.psi.counts_per_rev, sensors.theta.counts_per_rev (assumed). Measure them" in fit.verdict
+    assert {"sensors.psi.counts_per_rev", "sensors.theta.counts_per_rev"} <= set(fit.estimates["r"].rests_on)
 
 
 @pytest.mark.slow

@@ -31,8 +31,10 @@ MIRRORED = 3
 """Coordinates of a plant up to which sensors are tried the other way round as well."""
 
 DOUBTFUL, CLEAR = 0.1, 0.5
+LITTLE, BY_FAR = 0.02, 0.1
 """A plant that leaves more than the first is worse than one that leaves less than the second of it; two whose
-accelerations were smoothed over other spans are not distinguished by less.
+accelerations were smoothed over other spans are not distinguished by less. Of a double pendulum's angles a Furuta
+pendulum, its arm's length estimated, explains 96 %.
 """
 
 

@@ -20,7 +20,7 @@ from upright.records.analogue import in_places
 from upright.study.clock import check_clock
 from upright.study.draft.chain import chain_tables
 from upright.study.draft.chain_log import read_chain
-from upright.study.draft.compare import CLEAR, DOUBTFUL, LONGEST, explained
+from upright.study.draft.compare import BY_FAR, CLEAR, DOUBTFUL, LITTLE, LONGEST, explained
 from upright.study.draft.derived import derived_angle
 from upright.study.draft.described import describe
 from upright.study.draft.pendulum import pendulum_tables
@@ -147,7 +147,8 @@ def alike(record: Record, inspection: Inspection, recognised: Recognised) -> tup
     if recognised.plant not in shares:
         return "", by_columns
     own, best = shares[recognised.plant], next(iter(shares))
-    better = own < 1 - DOUBTFUL and 1 - shares[best] < CLEAR * (1 - own)
+    left, least = 1 - own, 1 - shares[best]
+    better = (left > DOUBTFUL and least < CLEAR * left) or (left > LITTLE and least < BY_FAR * left)
     named = named_after(list(recognised.columns.values())) == recognised.plant
     taken, reason = (recognised.plant, " by its columns") if named or not better else (best, "")
     rest = [n for n in (recognised.plant, *others) if n != taken]

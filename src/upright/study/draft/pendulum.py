@@ -120,7 +120,11 @@ def pendulum_tables(
     recognised = replace(recognised, doubts=(*recognised.doubts, *remarks))
     tables = [_rig(record, recognised, plant), _parameters(plant, starts), *_drive(recognised, plant, balanced)]
     tables += [_sensor(inspection, recognised, plant, name) for name in recognised.columns]
-    return recognised, [*tables, _defaults(recognised, plant, balanced), *_runs(recognised, file, label)]
+    return recognised, [
+        *tables,
+        _defaults(recognised, plant, balanced),
+        *_runs(record, recognised, file, label, balanced=balanced is not None),
+    ]
 
 
 def balance_of(record: Record, recognised: Recognised) -> Balanced | None:
@@ -231,6 +235,9 @@ def _carried(starts: PendulumStarts, plant: type[Plant]) -> PendulumStarts:
     )  # fmt: skip
 
 
+CHANGES, SWINGS = 2, 3.0
+"""Changes of a command, and swings, that a part of a log needs to say something by itself."""
+
 INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
 """What the drive moves, where the search begins [kg m^2, kg]."""
 
@@ -330,8 +337,8 @@ def _defaults(recognised: Recognised, plant: type[Plant], balanced: Balanced | N
     return table
 
 
-def _runs(recognised: Recognised, file: str, label: str) -> list[TomlTable]:
-    """One run; a long free swing keeps its tail for prediction, and of several the last one is predicted."""
+def _runs(record: Record, recognised: Recognised, file: str, label: str, *, balanced: bool) -> list[TomlTable]:
+    """One run; of a long one, free or driven, the tail is kept for prediction, and of several swings the last one."""
     start, stop = recognised.window
     if recognised.earlier:
         runs = [(f"{label} {i + 1}", a, b, "fit") for i, (a, b) in enumerate(recognised.earlier)]
@@ -339,7 +346,19 @@ def _runs(recognised: Recognised, file: str, label: str) -> list[TomlTable]:
     split = start + 0.6 * (stop - start)
     if recognised.drive is None and recognised.frequency * (stop - start) / (2 * np.pi) > 12:
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
+    if not balanced and _acts_in_both(record, recognised, driven := start + 2 / 3 * (stop - start)):
+        return run_tables(file, [(f"{label} start", start, driven, "fit"), (f"{label} tail", driven, stop, "predict")])
     return run_tables(file, [(label, start, stop, "fit")])
+
+
+def _acts_in_both(record: Record, recognised: Recognised, split: float) -> bool:
+    """Whether a command moves the rig for several swings before `split` [s] as well as after it."""
+    if recognised.drive is None or len(recognised.columns) < 2:
+        return False
+    (start, stop), t, u = recognised.window, record.t, record[recognised.drive.name]
+    parts = [u[(t >= start) & (t < split)], u[(t >= split) & (t <= stop)]]
+    changes = [int(np.count_nonzero(np.diff(part) != 0)) for part in parts]
+    return min(changes) >= CHANGES and recognised.frequency * (stop - split) / (2 * np.pi) > SWINGS
 
 
 def _si(unit: str) -> float:
