@@ -208,9 +208,9 @@ def test_an_arm_is_held_where_nothing_says_what_drove_it():
     assert {n: v["value"] for n, v in given.items() if "value" in v} == {
         "m_p": "0.1 kg", "J_p": "0 kg m^2", "J_d": "0.001 kg m^2",
     }  # fmt: skip
-    assert given["r"] == {"guess": "0.1 m"}
+    assert given["r"] == {"guess": "0.1 m", "max": "5 m"}
     thrown = drafted(shown("furuta", {"psi": ARM, "theta": PENDULUM}, throw=-0.8))
-    assert thrown["parameters"]["r"] == {"guess": f"{0.8 * L:.3g} m"}  # its hinge's acceleration is r psi''
+    assert thrown["parameters"]["r"]["guess"] == f"{0.8 * L:.3g} m"  # its hinge's acceleration is r psi''
     assert "b_1" not in given
     assert study["defaults"] == {"held": ["psi"], "unknown": ["initial", "offset"]}
     driven = drafted(shown("furuta", {"psi": ARM, "theta": PENDULUM}, drive=U))

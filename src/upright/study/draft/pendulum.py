@@ -96,13 +96,14 @@ class Balanced:
 class PendulumStarts:
     """Numbers of a plant in SI: `assumed` with the reason, `guesses` to estimate, `uncertain` with how much [%].
 
-    `known` are those of which nobody is asked, with the reason.
+    `known` are those of which nobody is asked, with the reason. `most` are what guesses are sought below.
     """
 
     assumed: Mapping[str, tuple[float, str]]
     guesses: Mapping[str, float]
     uncertain: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
     known: Mapping[str, tuple[float, str]] = field(default_factory=dict[str, tuple[float, str]])
+    most: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 def pendulum_tables(
@@ -211,7 +212,8 @@ def starts_hanging(recognised: Recognised, plant: type[Plant]) -> PendulumStarts
                 assumed["J_d"] = (1e-3, "MEASURE; not seen while the arm is held or locked")
         if driven:
             guesses |= {"b_1": INERTIA[recognised.plant] * 1.0, "b_1c": INERTIA[recognised.plant] * 0.1}
-        return PendulumStarts(assumed=assumed, guesses=guesses)
+        most = {"l_cg": LONGER * length, "r": 5.0} if recognised.frequency else {}
+        return PendulumStarts(assumed=assumed, guesses=guesses, most={n: v for n, v in most.items() if n in guesses})
     required = [f.name for f in fields(plant) if f.default is MISSING]  # type: ignore[arg-type]
     sizes = {"m": length, "kg m^2": length**2, "N m/rad": (w * length) ** 2, "N/m": w**2}
     viscous = {"N m s/rad": 0.002 * w * length**2, "N s/m": 0.002 * w}
@@ -237,6 +239,9 @@ def _carried(starts: PendulumStarts, plant: type[Plant]) -> PendulumStarts:
 
 CHANGES, SWINGS = 2, 3.0
 """Changes of a command, and swings, that a part of a log needs to say something by itself."""
+
+LONGER = 4.0
+"""Times the length of its period that a pendulum may have: one of 76 m stands still, and explains its cart alone."""
 
 INERTIA = {"furuta": 2e-3, "cart-pendulum": 1.1}
 """What the drive moves, where the search begins [kg m^2, kg]."""
@@ -264,7 +269,8 @@ def _parameters(plant: type[Plant], starts: PendulumStarts) -> TomlTable:
             value, percent = starts.uncertain[name]
             table.key(name, {"value": with_unit(value, what.unit), "uncertainty": percent}, f"{what.meaning}; MEASURE")
         elif name in starts.guesses:
-            table.key(name, {"guess": with_unit(starts.guesses[name], what.unit)}, what.meaning)
+            most = {"max": with_unit(starts.most[name], what.unit)} if name in starts.most else {}
+            table.key(name, {"guess": with_unit(starts.guesses[name], what.unit)} | most, what.meaning)
         elif name != "g":
             left.append(name)
     parameters_left_at_zero(table, plant, left)
