@@ -263,10 +263,12 @@ def met(source: Source, dialect: str) -> Contact:
 
 
 def _with_lumped(truth: dict[str, float]) -> dict[str, float]:
-    """The true numbers, and the length of the simple pendulum of equal period."""
+    """The true numbers, the length of the simple pendulum of equal period, and what forces are per mass and length."""
     if not {"l_cg", "m_p", "J_p"} <= truth.keys():
         return truth
-    return truth | {"J_A/(m_p l_cg)": truth["l_cg"] + truth["J_p"] / (truth["m_p"] * truth["l_cg"])}
+    moment = truth["m_p"] * truth["l_cg"]
+    ratios = {f"{n}/(m_p l_cg)": value / moment for n, value in truth.items() if n.startswith(("b_", "actuator.gain"))}
+    return truth | ratios | {"J_A/(m_p l_cg)": truth["l_cg"] + truth["J_p"] / moment}
 
 
 def _misses(estimate: Any, value: float, truth: float | None) -> bool:
