@@ -62,8 +62,10 @@ export class Session {
   /** Lets a fit describe the rig, or what came with it where that is ""; or another filter give velocities; why not, or "". */
   async describe(by: { fit: string } | { memory: number }): Promise<string> {
     if (this.unsteerable) return this.unsteerable;
+    const hardware = this.scene?.kind === "HARDWARE";
+    if (hardware && !confirm("This changes what drives a real rig. Use it from the next start on?")) return "Nothing was changed.";
     const headers = { "x-bench-me": this.scene?.you ?? "" }, address = `/api/rigs/${encodeURIComponent(this.name)}/model`;
-    const answer = await fetch(address, { method: "POST", headers, body: JSON.stringify(by) }).catch(() => undefined);
+    const answer = await fetch(address, { method: "POST", headers, body: JSON.stringify(hardware ? { ...by, confirm: true } : by) }).catch(() => undefined);
     return answer?.ok ? "" : ((await answer?.text()) ?? NO_CONNECTION);
   }
 

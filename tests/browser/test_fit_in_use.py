@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import upright as up
-from tests.browser.runs import ByHand, twin
+from tests.browser.runs import SOON, ByHand, hardware, twin
 from tests.browser.students import Server, student
 from tests.browser.test_fits import ask
 from tests.browser.test_page import tab_to
 from tests.browser.test_served import client
 from upright.basis import RESERVED, TRUSTED
-from upright.browser.identify.fits import COLUMNS, OWN
+from upright.browser.identify.fits import COLUMNS, OWN, Identifications
 from upright.browser.identify.fitted import fitted_rig
 from upright.browser.rig import HARDWARE, known_rig
 from upright.browser.serve import Bench
@@ -104,7 +106,7 @@ def test_what_is_not_trusted_or_of_another_rig_is_refused_and_nothing_changes(se
     ):  # fmt: skip
         status, text = use(bench, page.me, key)
         assert (status, why in text) == (400, True), text
-    for body in (b"", b"[]", b'{"fit": 1}', b"nonsense"):
+    for body in (b"", b"[]", b'{"fit": 1}', b"nonsense", b'{"memory": 1' + 310 * b"0" + b"}"):
         assert '{"fit": "fit-1"}' in ask(bench, "api/rigs/furuta/model", page.me, data=body)[2]
     assert "for the page of this bench" in use(bench, "nobody", "fit-3")[1]
     page.ask("operate")
@@ -142,6 +144,37 @@ def test_another_filter_gives_the_same_gains_other_velocities_from_the_next_star
     carry.end()
     page.note("state", state="ended")
     assert "from 0 to 0.99" in ask(bench, "api/rigs/furuta/model", page.me, data=b'{"memory": 1.5}')[2]
+
+
+def test_a_rig_that_can_really_move_gets_another_filter_only_where_that_is_confirmed(rig, tmp_path):
+    with Bench([hardware(rig)], tmp_path, carry=ByHand(), report=lambda *_: "") as bench, client(bench) as page:
+        before = bench.stations[0].rig
+        for sure in ("", ', "confirm": 1', ', "confirm": "true"'):
+            status, _, text = ask(bench, "api/rigs/furuta/model", page.me, data=f'{{"memory": 0.9{sure}}}'.encode())
+            assert (status, "confirm it" in text) == (400, True), text
+        assert bench.stations[0].rig is before
+        assert ask(bench, "api/rigs/furuta/model", page.me, data=b'{"memory": 0.9, "confirm": true}')[0] == 200
+        assert bench.stations[0].rig.memory == pytest.approx(0.9)
+
+
+def test_while_a_law_is_on_its_way_no_other_one_is_begun(served, monkeypatch):
+    bench, page, _, _ = served
+    begun, go, rig = threading.Event(), threading.Event(), bench.stations[0].rig
+
+    def slow(_own, _key):
+        begun.set()
+        assert go.wait(SOON)
+        return rig
+
+    monkeypatch.setattr(Identifications, "described_by", slow)
+    with ThreadPoolExecutor(1) as pool:
+        first = pool.submit(use, bench, page.me, "fit-1")
+        assert begun.wait(SOON)
+        status, text = use(bench, page.me, "fit-1")
+        go.set()
+        assert (status, "being designed" in text) == (400, True), text
+        assert first.result(SOON)[0] == 200
+    assert use(bench, page.me, "fit-1")[0] == 200
 
 
 REAL = """kind = "serial"

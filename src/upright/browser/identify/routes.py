@@ -16,6 +16,7 @@ from upright.browser.answers import nothing, report_page, sentence_of
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Identifications
 from upright.browser.messages import LONGEST
+from upright.browser.rig import HARDWARE
 from upright.errors import BadInput, UprightError
 
 WHO = "x-bench-me"
@@ -31,6 +32,7 @@ Answering = Callable[[Request], Awaitable[Response]]
 
 def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixed: str = "") -> list[Route]:
     """The addresses of some rigs; `fixed` is why they are known by their own descriptions alone, where that is so."""
+    adopting = set[str]()  # rigs for which a law is on its way, which takes a process some seconds
 
     async def described(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
@@ -98,16 +100,24 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         return nothing() if own is None else JSONResponse(own.weighing.described())
 
     async def adopt(request: Request, own: Identifications) -> Response:
-        key, memory = _model_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
+        key, memory, confirm = _model_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
         if fixed:
             raise BadInput(fixed)
-        hub = hubs[request.path_params["name"]]
-        station = hub.station
+        name = request.path_params["name"]
+        station = hubs[name].station
         station.at_rest()
-        rig = station.rig if key is None else await asyncio.to_thread(own.described_by, key)
-        if memory is not None:
-            rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
-        station.describe(request.headers.get(WHO, ""), rig)
+        if station.rig.kind == HARDWARE and not confirm:
+            raise BadInput("this changes what drives a rig that can really move; confirm it.")
+        if name in adopting:
+            raise BadInput("its law is being designed for another model already; wait until that is there.")
+        adopting.add(name)
+        try:
+            rig = station.rig if key is None else await asyncio.to_thread(own.described_by, key)
+            if memory is not None:
+                rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
+            station.describe(request.headers.get(WHO, ""), rig)
+        finally:
+            adopting.discard(name)
         return JSONResponse({})
 
     return [
@@ -138,21 +148,22 @@ def _wanted(text: bytes) -> tuple[str, str, dict[str, str]]:
     return log, of, known
 
 
-def _model_named(text: bytes) -> tuple[str | None, float | None]:
-    """Which fit is to describe a rig, and which memory its velocities' filter is to have; None for what stays."""
+def _model_named(text: bytes) -> tuple[str | None, float | None, bool]:
+    """Which fit is to describe a rig and which memory its velocities' filter is to have, None for what stays; sure?"""
     try:
         content: Any = json.loads(text)
-        key, memory = content.get("fit"), content.get("memory")
+        key, memory, confirm = content.get("fit"), content.get("memory"), content.get("confirm") is True
         number = isinstance(memory, int | float) and not isinstance(memory, bool)
         read = isinstance(key, str | None) and (memory is None or number) and (key, memory) != (None, None)
-    except (ValueError, RecursionError, AttributeError):
-        key, memory, read = None, None, False
+        memory = float(memory) if read and memory is not None else None
+    except (ValueError, RecursionError, AttributeError, OverflowError):
+        key, memory, confirm, read = None, None, False, False
     if not read:
         raise BadInput(
             'a model is chosen by {"fit": "fit-1"}, and by {"fit": ""} the one that the rig came with; the filter of '
             'its velocities by {"memory": 0.8}.'
         )
-    return key, memory
+    return key, memory, confirm
 
 
 def _operates(hub: Hub, who: str) -> None:
