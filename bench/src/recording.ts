@@ -7,10 +7,11 @@ import { short, shownUnit, signed, significant, symbol } from "./words";
 
 interface Point {
   omega: number;
-  dB: number[];
-  deg: number[];
-  dB_error: number[];
-  deg_error: number[];
+  /** null where a coordinate did not move. */
+  dB: (number | null)[];
+  deg: (number | null)[];
+  dB_error: (number | null)[];
+  deg_error: (number | null)[];
   settled: boolean;
 }
 
@@ -22,6 +23,10 @@ export interface Recorded {
   command: string;
   seconds: number;
   time: number;
+  /** Samples that were not read in time. */
+  lost: number;
+  /** Why its file was not stored; "" where it was. */
+  why: string;
   outputs: { name: string; unit: string; meaning: string }[];
   planned?: number[];
   line?: { omega: number[]; dB: number[][]; deg: number[][] };
@@ -42,7 +47,9 @@ export function stepped(values: number[], step: number, room = 0): { low: number
 }
 
 /** A value with half the width of its interval, to the digits that this leaves. */
-export function within(value: number, half: number): string {
+export function within(value: number | null, half: number | null): string {
+  if (value === null) return "none";
+  if (half === null) return signed(value, 1);
   const digits = half > 0 ? Math.max(0, Math.min(4, 1 - Math.floor(Math.log10(half)))) : 3;
   return `${signed(value, digits)} ± ${signed(half, digits)}`;
 }
@@ -91,19 +98,19 @@ export class Recording {
   }
 
   private words(): void {
-    const { kind, over, run, time, seconds, planned, points, reading, modes } = this.recorded!, link = byId<HTMLAnchorElement>("record-file");
+    const { kind, over, run, time, lost, why, seconds, planned, points, reading, modes } = this.recorded!, link = byId<HTMLAnchorElement>("record-file");
     const done = `${time.toFixed(0)} s of ${seconds.toFixed(0)} s`, unsettled = points?.filter((point) => !point.settled).length ?? 0;
     const measured = `${points?.length ?? 0} of ${planned?.length ?? 0} sines measured`;
     const late = unsettled ? ` ${unsettled === 1 ? "One has" : `${unsettled} have`} not settled, and count for less.` : "";
-    say(byId("record-says"), (kind === "sweep" ? `${measured}, ${done}.` : `${done}.`) + (over && kind === "sweep" ? late : "") + (over && run ? " It is kept as a run, and can be identified." : ""));
-    link.hidden = !over || !run || !points?.length;
+    say(byId("record-says"), (kind === "sweep" ? `${measured}, ${done}.` : `${done}.`) + (over && kind === "sweep" ? late : "") + (over && run ? " It is kept as a run, and can be identified." : "") + (why ? ` ${why}` : ""));
+    link.hidden = !over || !run || !!why || !points?.length;
     link.href = `${this.runs}/${run}.frequency.csv`;
     byId("record-points").replaceChildren(...(points ?? []).map((point) => make("tr", {}, make("th", { scope: "row" }, significant(point.omega, 3)),
-      ...point.dB.flatMap((dB, k) => [dB, point.deg[k]!].map((value, i) => make("td", { class: "number" }, within(value, (i ? point.deg_error : point.dB_error)[k]!)))))));
+      ...point.dB.flatMap((dB, k) => [dB, point.deg[k] ?? null].map((value, i) => make("td", { class: "number" }, within(value, (i ? point.deg_error : point.dB_error)[k] ?? null)))))));
     if (kind !== "step") return;
     const rows: [string, string, string][] = reading
       ? [["measured swing", within(reading.omega, reading.omega_error), within(reading.zeta, reading.zeta_error)]]
-      : [["measured swing", over ? "too few turning points" : "waiting for four turning points", ""]];
+      : [["measured swing", lost ? "samples were lost; record it again" : over ? "too few turning points" : "waiting for four turning points", ""]];
     for (const [how, [omega, zeta]] of Object.entries(modes ?? {})) rows.push([modes!.held ? `model, driven body ${how}` : "model", significant(omega, 4), significant(zeta, 2)]);
     byId("record-reading").replaceChildren(...rows.map(([name, omega, zeta]) => make("tr", {}, make("th", { scope: "row" }, name), make("td", { class: "number" }, omega), make("td", { class: "number" }, zeta))));
   }
@@ -113,11 +120,11 @@ export class Recording {
     if (!outputs) return;
     const canvases = document.querySelectorAll<HTMLCanvasElement>("#record-pictures canvas");
     if (line) outputs.forEach((_, k) => (["dB", "deg"] as const).forEach((what, i) => {
-      const model = line[what][k]!, known = points ?? [], y = known.map((point) => point[what][k]!), colour = `--q${k % 4}`;
+      const model = line[what][k]!, known = points ?? [], y = known.flatMap((point) => point[what][k] ?? []), colour = `--q${k % 4}`;
       const range = stepped([...model, ...y], what === "dB" ? 20 : DEGREES, what === "dB" ? LEAST : 5);
       const some = (settled: boolean): Line => {
-        const those = known.filter((point) => point.settled === settled);
-        return { x: those.map((point) => point.omega), y: those.map((point) => point[what][k]!), error: those.map((point) => point[`${what}_error`][k]!), colour, points: settled ? "filled" : "hollow" };
+        const those = known.filter((point) => point.settled === settled && point[what][k] !== null);
+        return { x: those.map((point) => point.omega), y: those.map((point) => point[what][k]!), error: those.map((point) => point[`${what}_error`][k] ?? 0), colour, points: settled ? "filled" : "hollow" };
       };
       drawChart(canvases[2 * k + i]!, {
         x: { low: line.omega[0]!, high: line.omega.at(-1)!, unit: "rad/s", log: true }, y: { ...range, unit: "" },

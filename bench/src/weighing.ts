@@ -12,7 +12,7 @@ interface Weighed {
   bare?: string;
   pieces?: number[];
   loadings?: number;
-  points?: { added: number; y: number; error: number }[];
+  points?: { added: number; y: number | null; error: number | null }[];
   line?: { k: number; bare: number };
   numbers?: { symbol: string; meaning: string; value: string; half: string; unit: string }[];
   verdict?: string;
@@ -57,15 +57,15 @@ export class Weighing {
   }
 
   draw(): void {
-    const { points, pieces, line } = this.weighed ?? {};
-    if (!points?.length || !pieces || !line) return;
+    const { pieces, line } = this.weighed ?? {}, points = (this.weighed?.points ?? []).flatMap(({ y, ...point }) => (y === null ? [] : [{ ...point, y }]));
+    if (!points.length || !pieces || !line?.k) return;
     const scale = this.small ? MILLI : 1, most = pieces.at(-1)!, at = (added: number) => (MILLI * (line.bare + added)) / line.k;
     const [low, high] = span([...points.map(({ y }) => MILLI * y), at(0), at(most)], []);
     drawChart(byId<HTMLCanvasElement>("weigh-line"), {
       x: { low: -0.05 * most * scale, high: 1.1 * most * scale, unit: "" }, y: { low, high, unit: "" },
       lines: [
         { x: [0, most * scale], y: [at(0), at(most)], colour: "--ink", dashes: [6, 3], thick: 1.2 },
-        { x: points.map(({ added }) => added * scale), y: points.map(({ y }) => MILLI * y), error: points.map(({ error }) => ERRORS * MILLI * error), colour: "--q0", points: "hollow" },
+        { x: points.map(({ added }) => added * scale), y: points.map(({ y }) => MILLI * y), error: points.map(({ error }) => ERRORS * MILLI * (error ?? 0)), colour: "--q0", points: "hollow" },
       ],
     });
   }

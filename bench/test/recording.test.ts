@@ -11,4 +11,5 @@ test("a value has the digits that half the width of its interval leaves", () => 
   expect(within(7.3566, 0.106)).toBe("7.36 ± 0.11");
   expect(within(-165.25, 6.2)).toBe("\u2212165.3 ± 6.2");
   expect(within(-31.8, 51)).toBe("\u221232 ± 51");
+  expect([within(null, null), within(-31.84, null)]).toEqual(["none", "\u221231.8"]);
 });

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 from dataclasses import replace
@@ -63,11 +64,12 @@ def played(rig, kind, folder, monkeypatch, lost=()):
 def test_of_a_sweep_each_point_is_the_line_of_a_fourier_transform_and_what_was_lost_leaves_the_others(
     rig, tmp_path, monkeypatch
 ):
-    drawn, y, u = played(rig, SWEEP, tmp_path, monkeypatch, lost=[70_000])
-    assert (drawn["over"], drawn["run"], drawn["kind"]) == (True, "run", "sweep")
-    assert len(drawn["points"]) == len(drawn["planned"]) - 1
-    missed = set(drawn["planned"]) - {p["omega"] for p in drawn["points"]}
     plan = stepped_sines(live_stand(rig.rig_path))
+    before = plan.windows[6][0] - 1  # whose readings are the first ones of that window
+    drawn, y, u = played(rig, SWEEP, tmp_path, monkeypatch, lost=[before, 70_000])
+    assert (drawn["over"], drawn["run"], drawn["kind"]) == (True, "run", "sweep")
+    assert len(drawn["points"]) == len(drawn["planned"]) - 2
+    missed = set(drawn["planned"]) - {p["omega"] for p in drawn["points"]}
     windows = dict(zip(plan.omega.tolist(), plan.windows, strict=True))
     for point in drawn["points"]:
         part = slice(*windows[point["omega"]])
@@ -84,7 +86,26 @@ def test_of_a_sweep_each_point_is_the_line_of_a_fourier_transform_and_what_was_l
     stored = FrequencyResponse.from_csv(tmp_path / "run.frequency.csv")
     assert stored.omega == pytest.approx([p["omega"] for p in drawn["points"]])
     assert stored.magnitude_dB == pytest.approx(np.array([p["dB"] for p in drawn["points"]]), abs=1e-3)
-    assert len(missed) == 1
+    assert (len(missed), plan.omega[6] in missed, drawn["lost"], drawn["why"]) == (2, True, 2, "")
+
+
+def test_a_coordinate_that_does_not_move_has_no_gain_and_a_file_that_cannot_be_stored_ends_nothing(
+    rig, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("upright.browser.identify.recording.OFTEN", 1e-4)
+    recording = Recording(rig, SWEEP)
+    u = np.array(recording.request.samples)
+    desk = Played(np.column_stack([u, np.zeros(u.size)]), u, rig.model.per_unit)
+    recording.begin(desk)
+    assert desk.over.wait(12 * SOON)
+    (tmp_path / "full").write_text("no folder", encoding="utf-8")
+    recording.end(tmp_path / "full" / "run.mcap")
+    drawn = recording.described()
+    json.dumps(drawn, allow_nan=False)
+    assert len(drawn["points"]) == len(drawn["planned"])
+    assert all(p["dB"][1] is None and abs(p["dB"][0]) < 0.5 for p in drawn["points"])  # the other one follows u itself
+    assert drawn["over"]
+    assert "was not stored" in drawn["why"]
 
 
 def test_a_run_shows_each_command_with_the_readings_after_it_and_its_log_with_those_before(rig, tmp_path):

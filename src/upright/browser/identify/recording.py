@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from upright.browser.messages import SWEEP
 from upright.browser.rig import HARDWARE, BenchRig
-from upright.errors import BadInput
+from upright.errors import BadInput, UprightError
 from upright.experiments.frequency_1b.one_by_one import (
     Sine,
     SteppedSines,
@@ -76,7 +76,7 @@ class Recording:
         )  # fmt: skip
         self._y, self._u = np.full((size, len(stand.names)), np.nan), np.full(size, np.nan)
         self._line: Facts = {}
-        self._next, self._came, self._tried = 0, 0, 0
+        self._next, self._came, self._tried, self._lost, self._why = 0, 0, 0, 0, ""
         self._sines: list[Sine] = []
         self._reading: Decay | None = None
         self._lock, self._over = threading.Lock(), threading.Event()
@@ -88,23 +88,27 @@ class Recording:
         self._thread.start()
 
     def end(self, log: Path | None = None) -> None:
-        """The run is over; the response is stored beside its log."""
+        """The run is over; the response is stored beside its log, and where it cannot be, the page says why."""
         self._over.set()
         if self._thread is not None:
             self._thread.join()
         with self._lock:
             self._run = "" if log is None else log.stem
             if log is not None and self._sines:
-                response_of_sines(self._sines, self._rig).to_csv(log.with_suffix(".frequency.csv"))
+                try:  # the run has to end, whatever becomes of the file
+                    response_of_sines(self._sines, self._rig).to_csv(log.with_suffix(".frequency.csv"))
+                except (OSError, UprightError) as error:
+                    self._why = f"The frequency response was not stored: {error}"
 
     def described(self) -> Facts:
         """What there is so far, as JSON holds it."""
         with self._lock:
             sines, came, decayed, run = list(self._sines), self._came, self._reading, self._run
+            lost, why = self._lost, self._why
         rig, plan = self._rig, self._plan
         facts = {
             "kind": self.kind, "over": self._over.is_set(), "run": run, "command": rig.unit,
-            "seconds": plan.seconds, "time": came * plan.period,
+            "seconds": plan.seconds, "time": came * plan.period, "lost": lost, "why": why,
             "outputs": [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in rig.plant.coordinates],
             **self._line,
         }  # fmt: skip
@@ -138,13 +142,15 @@ class Recording:
         if not sines:
             return []
         data, line = response_of_sines(list(sines), self._rig), self._line["line"]
+        with np.errstate(divide="ignore", invalid="ignore"):  # a coordinate that does not move has a gain of 0
+            gain, error = data.magnitude_dB, NORMAL * data.error
         model = np.array([np.interp(np.log(data.omega), np.log(line["omega"]), deg) for deg in line["deg"]]).T
         angle = np.degrees(np.angle(data.response))
         angle += 360 * np.round((model - angle) / 360)
         return [
-            {"omega": float(data.omega[k]), "dB": _short(data.magnitude_dB[k]), "deg": _short(angle[k]),
-             "dB_error": _short(NORMAL * 20 / math.log(10) * data.error[k]),
-             "deg_error": _short(NORMAL * np.degrees(data.error[k])), "settled": s.settled}
+            {"omega": float(data.omega[k]), "dB": _short(gain[k]), "deg": _short(angle[k]),
+             "dB_error": _short(20 / math.log(10) * error[k]),
+             "deg_error": _short(np.degrees(error[k])), "settled": s.settled}
             for k, s in enumerate(sines)
         ]  # fmt: skip
 
@@ -174,22 +180,24 @@ class Recording:
             with self._lock:
                 self._reading = decayed
         with self._lock:
-            self._came = came
+            self._came, self._lost = came, int(np.isnan(self._u[:came]).sum())
 
     def _measure(self, plan: SteppedSines, came: int) -> None:
         while self._tried < len(plan.windows) and plan.windows[self._tried][1] <= came:
             part = slice(*plan.windows[self._tried])
-            if np.isfinite(self._u[part]).all():  # else this machine was too slow to read them in time
+            # else this machine was too slow to read them in time
+            if np.isfinite(self._u[part]).all() and np.isfinite(self._y[part]).all():
                 measured = sine(plan, self._tried, self._rig, self._y[part], self._u[part])
                 with self._lock:
                     self._sines.append(measured)
             self._tried += 1
 
 
-def _short(values: Array) -> list[float]:
-    return [float(f"{v:.5g}") for v in values.tolist()]
+def _short(values: Array) -> list[float | None]:
+    """Five digits of each; None where there is no number, which JSON cannot hold, as of a gain of 0 in dB."""
+    return [float(f"{v:.5g}") if math.isfinite(v) else None for v in values.tolist()]
 
 
 def _thinned(t: Array, y: Array) -> list[list[float | None]]:
     times, values = decimated(t, y, BUCKETS)
-    return [[float(f"{v:.5g}") if math.isfinite(v) else None for v in column] for column in (times, values)]
+    return [_short(column) for column in (times, values)]

@@ -11,6 +11,7 @@ from typing import Any
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.weighing_1a.loadings import weigh
 from upright.experiments.weighing_1a.run import PIECES, LoadedRig, first_body, step_log
+from upright.files import plain_values
 from upright.identification.loadings import Loadings
 from upright.identification.model.fit import Estimate
 from upright.progress import Progress
@@ -44,7 +45,7 @@ def weigh_body(path: Path, progress: Progress, show: Callable[[Facts], None]) ->
         for shot in range(SHOTS):
             logs[f"{count} masses, run {shot + 1}"] = step_log(on, count, shot=shot)
             added.append(count * on.body.piece)
-        facts = _facts(on, logs, added)
+        facts = plain_values(_facts(on, logs, added))
         show(facts)
     if "line" not in facts:
         raise BadInput("too few of its swings could be read; friction holds it.")
