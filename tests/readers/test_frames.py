@@ -54,6 +54,13 @@ FILES = {
     **{f"JSON, {o}": FRAME.to_json(orient=o) for o in ("records", "columns", "index", "split", "table")},
     "JSON, lists": json.dumps(LISTS),
     "JSON, lists within": json.dumps({"rig": "arm 3", "period": 0.005, "run": {"data": LISTS}}, indent=2),
+    "indexed, no name": parquet(stamped(index=True).rename_axis(None)),
+    "JSON, index": FRAME.set_index("time_s").to_json(),
+    "JSON, index by rows": FRAME.set_index("time_s").to_json(orient="index"),
+    "JSON, split index": FRAME.set_index("time_s").to_json(orient="split"),
+    "JSON, time above": json.dumps(
+        {"time_s": LISTS["time_s"], "of": "arm 3", "y": {n: LISTS[n] for n in ("theta [rad]", "u")}}
+    ),
     "JSON, stamps": stamped(index=False).to_json(orient="records", date_format="iso", date_unit="us"),
 }
 
@@ -61,10 +68,17 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_a_frame_comes_back_whole(name):
     record = read(FILES[name])
+    names = {n.removeprefix("y."): n for n in record.names}
     np.testing.assert_allclose(record.t, T, rtol=0, atol=1e-9)
-    np.testing.assert_array_equal(record["theta [rad]"], FRAME["theta [rad]"])
-    np.testing.assert_array_equal(record["u"], FRAME["u"])
-    assert record.units["theta [rad]"] == "rad"
+    np.testing.assert_array_equal(record[names["theta [rad]"]], FRAME["theta [rad]"])
+    np.testing.assert_array_equal(record[names["u"]], FRAME["u"])
+    assert record.units[names["theta [rad]"]] == "rad"
+
+
+def test_names_that_are_numbers_are_no_row():
+    record = read(pd.DataFrame(FRAME.to_numpy()).to_json(orient="split"))
+    assert record.t.size == N
+    np.testing.assert_array_equal(record["c1"], FRAME["theta [rad]"])
 
 
 def test_objects_within_objects_are_named_by_both():

@@ -75,3 +75,11 @@ def test_rows_without_a_time_are_counted_where_somebody_says_what_lies_between_t
 def test_a_log_that_begins_with_a_column_that_rises_keeps_it_as_its_time(tmp_path):
     (tmp_path / "log.txt").write_text("0 5\n1 6\n2 4\n3 5\n" * 1, encoding="utf-8")
     assert up.read(tmp_path / "log.txt", time_unit="20 ms").t == pytest.approx([0, 0.02, 0.04, 0.06])
+
+
+def test_a_log_with_a_time_of_its_own_is_not_counted(tmp_path):
+    (tmp_path / "log.csv").write_text(
+        "time,theta\n" + "".join(f"{0.02 * i:.2f},{i}\n" for i in range(20)), encoding="utf-8"
+    )
+    with pytest.raises(BadInput, match=r"has a time of its own, 0\.02 s from sample"):
+        up.read(tmp_path / "log.csv", time_unit="20 ms")

@@ -219,7 +219,7 @@ def _study(path: Path, log: str) -> tuple[Rig, Wiring]:
     names = tuple(str(n) for n in locked) if isinstance(locked, list | dict) else ()
     # the drive's sign is in the wiring, so not in the rig
     rig = rig_with_guesses(model, str(path), Hardware())
-    return rig, Wiring(sensors=sensors, drive=drive, locked=names)
+    return rig, Wiring(sensors=sensors, drive=drive, locked=names, study=study)
 
 
 def case_of(record: Record, inspection: Inspection, rig: Rig | type[Plant] | None, wiring: Wiring) -> Case:

@@ -19,7 +19,7 @@ from upright.readers.inspection import inspect_record
 from upright.records import Record
 from upright.rig import Rig
 from upright.study.draft.suits import plants_that_suit
-from upright.study.sensors import Wiring
+from upright.study.sensors import Wiring, with_derived
 
 HOPELESS = frozenset({"dead", "stuck", "gap", "doubled", "jitter"})
 """Findings after which equations of motion are not evaluated: they would only repeat them."""
@@ -40,8 +40,9 @@ def examine(
     before : tuple of Finding
         What was found, and mended, while the log was read.
     """
-    inspection = inspect_record(record)
     wiring = wiring or Wiring()
+    record = record if wiring.study is None else with_derived(record, wiring.study)
+    inspection = inspect_record(record)
     case = case_of(record, inspection, rig, wiring)
     findings = [*before, *examine_clock(case)]
     sensors, mended = examine_sensors(case)

@@ -125,7 +125,7 @@ def _digits(t: Array) -> int:
         last = _last_digit(t, digits)
         if last[-1] < _MATTERS * period:
             return 0
-        if last[-1] > 1.5 * last[t.size // 4] and (np.abs(t / last - np.round(t / last)) < 1e-6 * t.size).all():
+        if last[-1] > 1.5 * last[t.size // 4] and (np.abs(t / last - np.round(t / last)) < 1e-6).all():
             return digits
     return 0
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from upright.errors import BadInput
 from upright.records import Record
 from upright.units import known, parse, same_dimension, scale
@@ -26,6 +28,12 @@ def with_time_unit(record: Record, unit: str) -> Record:
     if not unit:
         return record
     if counts_rows(unit):
+        steps = np.diff(record.t)
+        if not ((record.t == np.round(record.t)).all() and np.median(steps) == 1.0):
+            raise BadInput(
+                f"'{record.provenance.file or 'the log'}' has a time of its own, {record.period:.4g} s from sample to "
+                f"sample; leave the time between two rows out."
+            )
         return record.replace(t=record.t * parse(unit, "s"))
     if not (known(unit) and same_dimension(unit, "s")):
         raise BadInput(f"expected a unit of time, such as 'ms', 'us' or 's', got '{unit[:40]}'.")

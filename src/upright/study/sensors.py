@@ -142,11 +142,15 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class Wiring:
-    """Which column of a log is what, and which coordinates were locked meanwhile; all of it may be empty."""
+    """Which column of a log is what, and which coordinates were locked meanwhile; all of it may be empty.
+
+    `study` has the columns that are computed from those of the log, see `with_derived`.
+    """
 
     sensors: Mapping[str, Sensor] = field(default_factory=dict[str, Sensor])
     drive: Drive | None = None
     locked: tuple[str, ...] = ()
+    study: Section | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

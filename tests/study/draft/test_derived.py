@@ -60,12 +60,20 @@ def log_of(text):
     return read_source(Source(file="log.txt", data=text.encode()))
 
 
+def in_unit(unit, per):
+    """A gyroscope's speed in another unit, `per` of it in 1 rad/s."""
+    return table((f"gyro ({unit})",), [per * (OMEGA + noise(0.01, 5) + BIAS)])
+
+
 LOGS = {
     "marker": marker(),
     "picture": marker(downwards=True),
     "captured": marker(names=("bob X [m]", "bob Z [m]")),
     "gyroscope": gyroscope(),
     "tilted": gyroscope(0.6),
+    "degrees": in_unit("deg/s", 180 / np.pi),
+    "degree signs": in_unit("°/s", 180 / np.pi),
+    "rpm": in_unit("rpm", 60 / (2 * np.pi)),
 }
 
 
@@ -77,7 +85,7 @@ def test_the_angle_is_that_of_the_pendulum(name):
     record = log_of(LOGS[name])
     found = derived_angle(record, inspect(record), places=name in PLACES)
     assert found is not None
-    angle = found.in_place(record)["theta"]
+    angle = found.in_place(record)["theta"] * {"rad": 1.0, "deg": np.pi / 180}[found.unit]
     angle = angle * np.sign(np.corrcoef(angle, THETA)[0, 1])
     off = angle - THETA
     # a marker's place is off by 0.3 mm of 420; a speed's integral wanders by 0.01 rad/s sqrt(16 s/100 Hz) = 4 mrad,
@@ -154,3 +162,10 @@ def test_a_study_computes_a_column(tmp_path):
 def test_a_column_that_cannot_be_computed_is_a_sentence(was, now, sentence, tmp_path):
     with pytest.raises(BadInput, match=sentence):
         study(STUDY.replace(was, now), tmp_path)
+
+
+def test_the_doctor_looks_at_the_column_that_a_study_computes(tmp_path):
+    (tmp_path / "log.txt").write_text(LOGS["marker"], encoding="utf-8")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    diagnosis = up.doctor(tmp_path / "log.txt", rig=str(tmp_path / "study.toml"))
+    assert not [f for f in diagnosis.findings if f.severity == "error"]

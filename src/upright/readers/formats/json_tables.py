@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from upright.errors import BadInput
-from upright.readers.formats.delimited import of_columns
+from upright.readers.formats.delimited import begins_with_number, of_columns
 from upright.readers.reader import Reader
 from upright.readers.source import Source
 from upright.records import Record
+from upright.records.columns import time_scale
 
 _LEAST = 4
 """Rows of what counts as a table."""
@@ -83,18 +84,31 @@ def _columns(node: Any) -> Mapping[str, Sequence[Any]] | None:
         return None
     if isinstance(node.get("columns"), list) and isinstance(node.get("data"), list):  # pandas' split
         names, rows = node["columns"], node["data"]
-        whole = _even(rows, len(names))
-        return _numeric({str(n): [row[j] for row in rows] for j, n in enumerate(names)}) if whole else None
+        if not _even(rows, len(names)):
+            return None
+        columns = {str(n): [row[j] for row in rows] for j, n in enumerate(names)}
+        return _numeric(_with_index(node.get("index"), columns))
     if len(node) > 1 and all(isinstance(inner, dict) for inner in node.values()):  # pandas' columns, or its index
         first = next(iter(node.values()))
         if any(inner.keys() != first.keys() for inner in node.values()):
             return None
         if len(node) < _LEAST or len(first) > len(node):
-            return _numeric({name: list(column.values()) for name, column in node.items()})
-        return _numeric({name: [row[name] for row in node.values()] for name in first})
+            return _numeric(_with_index(list(first), {name: list(column.values()) for name, column in node.items()}))
+        return _numeric(_with_index(list(node), {name: [row[name] for row in node.values()] for name in first}))
     lists = {name: column for name, column in node.items() if isinstance(column, list)}
     longest = max(map(len, lists.values()), default=0)
+    for name, inner in node.items():  # beside a time that stands one level up
+        if isinstance(inner, dict) and any(time_scale(own) and len(lists[own]) == longest for own in lists):
+            lists |= {f"{name}.{n}": column for n, column in inner.items() if isinstance(column, list)}
     return _numeric({name: column for name, column in lists.items() if len(column) == longest})
+
+
+def _with_index(index: Any, columns: Mapping[str, Sequence[Any]]) -> Mapping[str, Sequence[Any]]:
+    """Columns behind the index of a frame, where it does more than count the rows and no column is a time."""
+    if not isinstance(index, list) or any(map(time_scale, columns)) or "index" in columns:
+        return columns
+    keys = [float(key) if isinstance(key, str) and begins_with_number(key) else key for key in index]
+    return columns if keys == list(range(len(keys))) else {"index": keys, **columns}
 
 
 def _even(rows: Sequence[Any], width: int) -> bool:

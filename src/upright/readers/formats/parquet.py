@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from datetime import datetime
 from io import BytesIO
 from typing import Any
 
@@ -12,8 +13,10 @@ from upright.readers.formats.delimited import of_columns
 from upright.readers.reader import Reader
 from upright.readers.source import Source
 from upright.records import Record
+from upright.records.columns import time_scale
 from upright.records.record import KEY
 
+_INDEX = "__index_level_"
 _PARQUET, _FEATHER = b"PAR1", b"ARROW1"
 
 
@@ -24,7 +27,12 @@ def read(source: Source) -> Record:
     if about and "t" in table.column_names:
         columns = {name: table[name].to_numpy() for name in table.column_names}
         return Record.rebuild(columns.pop("t"), columns, about)
-    names = [name for name in table.column_names if not name.startswith("__index_level_")]
+    names: list[str] = list(table.column_names)
+    if len(set(names)) < len(names):
+        raise source.bad(f"expected a name of its own for each column, got {', '.join(names)}; rename them")
+    if any(time_scale(name) for name in names):
+        names = [name for name in names if not name.startswith(_INDEX)]
+    names.sort(key=lambda name: not name.startswith(_INDEX))  # the index of a frame may be its time
     record = of_columns(source, {name: _cells(source, name, table[name]) for name in names})
     return replace(record, provenance=source.provenance("parquet", *record.provenance.notes))
 
@@ -66,12 +74,16 @@ def _bounded(source: Source, numbers: int) -> None:
 
 def _cells(source: Source, name: str, column: Any) -> list[str]:
     """A column as text: numbers to the last bit, stamps as ISO 8601 has them."""
+    import pyarrow as pa
+
+    if pa.types.is_timestamp(column.type):  # Python's own hold microseconds
+        column = column.cast(pa.timestamp("us", column.type.tz), safe=False)
     values = column.to_pylist()
     if None in values:
         raise source.bad(
             "expected a value in every row, got none; fill or drop the row", sample=values.index(None) + 1, name=name
         )
-    if values and hasattr(values[0], "hour"):
+    if values and isinstance(values[0], datetime):
         return [value.isoformat(sep=" ", timespec="microseconds") for value in values]
     if not all(isinstance(value, float | int) for value in values):  # True is a number too
         raise source.bad(f"expected numbers in the column '{name}', got {values[0]!r}; drop it and save again")

@@ -15,7 +15,7 @@ from upright.readers.inspection import Column, Inspection
 from upright.records import Array, Record
 from upright.study import expressions
 from upright.study.text import TomlTable, toml
-from upright.units import same_dimension
+from upright.units import same_dimension, scale
 
 ROUND = 0.02
 """What a marker's distance from the middle may vary by, of the radius (rms), for its path to be an arc."""
@@ -25,6 +25,7 @@ _MOST = 4000
 """Samples that show where the middle is."""
 _ALIGNED = 0.999
 """Share of an axis in the turning from which on the others say nothing."""
+_TURNING = re.compile(r"rad|deg|°|rev|rpm|turn", re.IGNORECASE)
 _AXIS = re.compile(r"(?<![a-z])[xyz](?![a-z])", re.IGNORECASE)
 
 
@@ -117,7 +118,8 @@ def _from(name: str, zero: float) -> str:
 
 def _turned(record: Record, moves: Sequence[Column]) -> DerivedAngle | None:
     """The angle through which something has turned, by its speed."""
-    speeds = [c for c in moves if c.unit and same_dimension(c.unit, "rad/s") and float(record[c.name].min()) < 0]
+    speeds = [c for c in moves if _TURNING.search(c.unit) and same_dimension(c.unit, "rad/s")]
+    speeds = [c for c in speeds if float(record[c.name].min()) < 0]
     if not speeds:
         return None
     first = max(speeds, key=lambda c: float(np.std(record[c.name])))
@@ -136,11 +138,14 @@ def _turned(record: Record, moves: Sequence[Column]) -> DerivedAngle | None:
     )
     total = " + ".join(parts).replace("+ -", "- ")
     sign = "-" if bias >= 0 else "+"
-    unit = "deg" if "deg" in first.unit else "rad"
+    degrees = math.isclose(scale(first.unit), math.radians(1))
+    factor = 1.0 if degrees else scale(first.unit)
     names = " and ".join(f"'{c.name}'" for c in axes)
     return DerivedAngle(
-        formula=f"integral({total} {sign} {abs(bias):.6g})",
-        unit=unit,
+        formula=f"integral({total} {sign} {abs(bias):.6g})"
+        if factor == 1.0
+        else f"{factor:.9g}*integral({total} {sign} {abs(bias):.6g})",
+        unit="deg" if degrees else "rad",
         of=tuple(c.name for c in moves),
         doubt=f"{names} measures a speed: integrated to an angle, less {bias:.3g} {first.unit} that it shows at rest.",
     )
