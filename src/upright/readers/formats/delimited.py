@@ -192,8 +192,10 @@ def of_columns(source: Source, columns: Mapping[str, Sequence[str]]) -> Record:
     """The record that `read` makes of columns whose cells are given as text; a column of stamps may be anywhere."""
     stamped = next((name for name, cells in columns.items() if cells and in_seconds(cells[0])[1]), None)
     names = sorted(columns, key=lambda name: name != stamped)
-    said = [f"c{name}" if begins_with_number(name) else re.sub(r"\s+", " ", name).replace('"', "'") for name in names]
-    head = ",".join(f'"{name}"' if "," in name else name for name in said)
+    written = [
+        f"c{name}" if begins_with_number(name) else re.sub(r"\s+", " ", name).replace('"', "'") for name in names
+    ]
+    head = ",".join(f'"{name}"' if "," in name else name for name in written)
     rows = map(",".join, zip(*(columns[name] for name in names), strict=True))
     return tabulated(source, "\n".join([head, *rows]) + "\n")
 
