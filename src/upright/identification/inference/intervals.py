@@ -290,7 +290,7 @@ def beyond_bounds(best: Optimum, estimates: Mapping[str, Estimate]) -> Intervals
             other = unknowns[i]
             if not other.shared or other.name not in intervals:
                 continue
-            there = float(value[i] * math.exp(np.clip(d, -700, 700)) if other.log else value[i] + d)
+            there = float(value[i] * math.exp(np.clip(d, -300, 300)) if other.log else value[i] + d)
             there = min(max(there, other.lower), other.upper)
             a, b = intervals[other.name]
             intervals[other.name] = (min(a, there), max(b, there))
