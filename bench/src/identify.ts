@@ -186,6 +186,7 @@ export class Identify {
     byId("weigh-live").hidden = !this.weighed || !!now || !this.weighing.there;
     byId("record-live").hidden = !this.recorded || !!now || !byId("weigh-live").hidden;
     byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden || !byId("record-live").hidden || !byId("weigh-live").hidden;
+    if (byId("fit-result").hidden) byId<HTMLSelectElement>("fit-list").value = ""; // so that the last one can be chosen, too
     if (now) {
       say(byId("fit-step"), `${now.step}, ${now.seconds.toFixed(0)} s`);
       this.say(`Identifying ${now.name}.`);
