@@ -111,9 +111,14 @@ def test_by_keyboard_the_lqr_slider_gives_the_gains_of_riccati_s_equation_and_th
         Q = np.diag([1 / weighed[0] ** 2, 0, 1 / weighed[1] ** 2, 0])
         S = solve_continuous_are(linear.A, linear.B, Q, [[price / RIG.limit**2]])
         K = RIG.limit**2 / price * (linear.B.T @ S)[0]
-        shown = " ".join(page.locator("#before tr:has-text('gains on') td").all_inner_texts())
-        gains = [float(text) for text in re.findall(r"-?[\d.]+", shown.replace("\u2212", "-"))]
-        assert gains == pytest.approx(K.tolist(), rel=6e-3)  # three digits are shown
+        expected, gains = pytest.approx(K.tolist(), rel=6e-3), []  # three digits are shown
+        for _ in range(80):  # once the page has computed what it shows
+            shown = " ".join(page.locator("#before tr:has-text('gains on') td").all_inner_texts())
+            gains = [float(text) for text in re.findall(r"-?[\d.]+", shown.replace("\u2212", "-"))]
+            if gains == expected:
+                break
+            page.wait_for_timeout(250)
+        assert gains == expected
         tab_to(page, "#apply")
         page.keyboard.press("Enter")
         one.reads("#message", r"act from tick \d+")
