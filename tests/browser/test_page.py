@@ -267,7 +267,7 @@ def test_hanging_it_swings_up_and_stands_in_the_picture_as_in_the_frames(server,
         one.reads("#readings", r"from upright.?-?\u2212?\d\.\d deg")
         assert abs(theta[0]) < per_turn / 36
         page.click("#tab-design")
-        one.reads("#gate", "A swing-up runs")
+        one.reads("#gate", "While a swing-up runs")
         page.click("#tab-run")
         page.click("#end")
         one.sees("ended")
