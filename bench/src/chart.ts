@@ -1,6 +1,7 @@
 // Lines and points against linear or logarithmic axes, on a canvas.
 
 import { marks } from "./curves";
+import { surface } from "./surface";
 import { signed, significant } from "./words";
 
 export interface Axis {
@@ -46,18 +47,12 @@ export function decades(low: number, high: number): number[] {
 }
 
 export function drawChart(canvas: HTMLCanvasElement, { x: across, y: up, lines, level }: Chart): void {
-  const width = canvas.clientWidth, height = canvas.clientHeight, dense = devicePixelRatio || 1;
-  if (!width || !height) return;
-  canvas.width = Math.round(width * dense);
-  canvas.height = Math.round(height * dense);
-  const c = canvas.getContext("2d")!, style = getComputedStyle(document.documentElement);
-  const tone = (name: string) => style.getPropertyValue(name).trim();
+  const on = surface(canvas);
+  if (!on) return;
+  const { c, width, height, tone } = on;
   const named = lines.some((line) => line.name), right = width - RIGHT - (named ? 24 : 0), bottom = height - BELOW;
   const share = ({ low, high, log }: Axis, v: number) => (log ? Math.log(v / low) / Math.log(high / low) : (v - low) / (high - low || 1));
   const x = (v: number) => LEFT + (right - LEFT) * share(across, v), y = (v: number) => bottom - (bottom - TOP) * share(up, v);
-  c.setTransform(dense, 0, 0, dense, 0, 0);
-  c.clearRect(0, 0, width, height);
-  c.font = `13px ${style.getPropertyValue("--sans")}`;
   c.lineWidth = 1;
   c.fillStyle = tone("--ink-2");
   const written = (axis: Axis, wanted: number): [number, string][] => {

@@ -1,5 +1,6 @@
 // A signal as measured and as a model has it, against time, on a canvas.
 
+import { surface } from "./surface";
 import { signed } from "./words";
 
 /** Times and values of a curve; a value is null where there is none. */
@@ -36,21 +37,15 @@ export function span(measured: number[], predicted: number[]): [number, number] 
 }
 
 export function drawCurves(canvas: HTMLCanvasElement, { measured, predicted, from, scale, colour }: Curves): void {
-  const width = canvas.clientWidth, height = canvas.clientHeight, dense = devicePixelRatio || 1;
-  if (!width || !height) return;
-  canvas.width = Math.round(width * dense);
-  canvas.height = Math.round(height * dense);
-  const c = canvas.getContext("2d")!, style = getComputedStyle(document.documentElement);
-  const tone = (name: string) => style.getPropertyValue(name).trim();
+  const on = surface(canvas);
+  if (!on) return;
+  const { c, width, height, tone } = on;
   const scaled = ([, y]: Curve) => y.map((v) => (v === null ? null : v * scale));
   const there = (y: (number | null)[]) => y.filter((v): v is number => v !== null);
   const ys = scaled(measured), model = scaled(predicted), [low, high] = span(there(ys), there(model));
   const t0 = measured[0][0]!, t1 = measured[0].at(-1)!, right = width - RIGHT, bottom = height - BELOW;
   const x = (t: number) => LEFT + ((right - LEFT) * (t - t0)) / (t1 - t0 || 1);
   const y = (v: number) => TOP + ((bottom - TOP) * (high - v)) / (high - low);
-  c.setTransform(dense, 0, 0, dense, 0, 0);
-  c.clearRect(0, 0, width, height);
-  c.font = `13px ${style.getPropertyValue("--sans")}`;
   if (from > t0) {
     c.fillStyle = tone("--sunken");
     c.fillRect(x(from), TOP, right - x(from), bottom - TOP);

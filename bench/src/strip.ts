@@ -1,5 +1,6 @@
 // A strip chart on a canvas: a line, its grid, its limits.
 
+import { surface } from "./surface";
 import { rangeFor, significant } from "./words";
 
 export interface Strip {
@@ -20,26 +21,18 @@ export interface Strip {
 const LEFT = 52, BELOW = 20, TOP = 8, CLOSE = 64; // px
 
 export function drawStrip(canvas: HTMLCanvasElement, strip: Strip): void {
-  const width = canvas.clientWidth, height = canvas.clientHeight, dense = devicePixelRatio || 1;
-  if (!width || !height) return;
-  if (canvas.width !== Math.round(width * dense) || canvas.height !== Math.round(height * dense)) {
-    canvas.width = Math.round(width * dense);
-    canvas.height = Math.round(height * dense);
-  }
-  const c = canvas.getContext("2d")!, style = getComputedStyle(document.documentElement);
-  const colour = (name: string) => style.getPropertyValue(name).trim();
+  const on = surface(canvas);
+  if (!on) return;
+  const { c, width, height, tone } = on;
   const { range, tick, limit, count } = strip, right = width - 6;
   const x = (k: number) => LEFT + ((right - LEFT) * k) / Math.max(1, count - 1);
   const y = (v: number) => TOP + ((height - BELOW - TOP) * (1 - Math.max(-1, Math.min(1, v / range)))) / 2;
   const level = (v: number) => { c.moveTo(LEFT, y(v)); c.lineTo(width, y(v)); };
-  c.setTransform(dense, 0, 0, dense, 0, 0);
-  c.clearRect(0, 0, width, height);
-  c.font = `13px ${style.getPropertyValue("--sans")}`;
-  c.fillStyle = colour("--ink-2");
+  c.fillStyle = tone("--ink-2");
   c.lineWidth = 1;
   c.textAlign = "right";
   for (const v of [-tick, 0, tick]) {
-    c.strokeStyle = colour(v ? "--line" : "--line-strong");
+    c.strokeStyle = tone(v ? "--line" : "--line-strong");
     c.beginPath();
     level(v);
     c.stroke();
@@ -52,7 +45,7 @@ export function drawStrip(canvas: HTMLCanvasElement, strip: Strip): void {
     c.fillText(time, LEFT + ((right - LEFT) * i) / last, height - 4);
   });
   if (limit !== undefined && limit <= range) {
-    c.strokeStyle = colour("--care");
+    c.strokeStyle = tone("--care");
     c.setLineDash([5, 4]);
     c.beginPath();
     level(limit);
@@ -69,7 +62,7 @@ export function drawStrip(canvas: HTMLCanvasElement, strip: Strip): void {
       else c.moveTo(x(k), y(v));
       drawing = true;
     };
-    c.strokeStyle = colour(name);
+    c.strokeStyle = tone(name);
     c.lineWidth = thick;
     c.lineJoin = "round";
     c.beginPath();

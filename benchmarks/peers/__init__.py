@@ -7,9 +7,7 @@ comes before the samples that count. Of the driven Furuta pendulum (macstepien) 
 predicted, its first angles refitted: arm / pendulum. Its lean and the lag of its drive are in nobody's model.
 SINDy and NARX, as written here, take one angle and no command.
 
-opty is ahead on aau. Its midpoint rule in steps of 6.7 ms slows that swing by 0.011 %, which its inertia takes up;
-upright's numbers with an inertia smaller by as much predict the tail to 97.1 %, and the rest of the lead is not
-explained. On the driven Furuta SciPy is nearer in the pendulum and farther in the arm, and nobody looked into why.
+opty is ahead on aau. On the driven Furuta SciPy is nearer in the pendulum and farther in the arm. Neither is explained.
 
 Seconds are those of the processor, compilers included, so that other work on the machine does not count as much.
 

@@ -117,7 +117,7 @@ def tail(study: str, data: Path) -> Task:
 
 
 def driven(data: Path) -> Task:
-    """A public Furuta pendulum: its arm shaken by a sine of 2 V is fitted, one of 4 V predicted.
+    """A public Furuta pendulum: its arm shaken by a sine of 4 V is fitted, one of 2 V predicted.
 
     The encoders are zeroed where the rig hangs, and everyone gets the samples every 2 ms. The study also has a lean of
     the base and a lag of the drive; nobody is given these here.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from upright.errors import UprightError
+from upright.records import Array
 
 
 def nothing() -> Response:
@@ -24,3 +26,15 @@ def sentence_of(error: UprightError) -> str:
     """What it says, beginning as a sentence does."""
     text = str(error)
     return text[:1].upper() + text[1:]
+
+
+def five_digits(values: Array) -> list[float | None]:
+    """Five digits of each; None where there is no number, which JSON cannot hold."""
+    return [float(f"{v:.5g}") if math.isfinite(v) else None for v in values.tolist()]
+
+
+def thinned(t: Array, y: Array, buckets: int) -> list[list[float | None]]:
+    """Times and values of a curve with at most two samples a bucket, as a page draws it."""
+    from upright.report.drawing import decimated
+
+    return [five_digits(column) for column in decimated(t, y, buckets)]

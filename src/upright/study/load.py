@@ -134,8 +134,8 @@ def load_study(
     plant = plant or read_plant(study)
     rig = read_rig(study, plant, drive_unit(study), fixed)
     folder = Path(data) if data is not None else path.parent
-    logs = {(name, "", "", ""): record for name, record in (records or {}).items()}
-    read = read_runs(study, plant, lambda run: with_derived(_log(run, folder, logs), study)) if runs else ()
+    logs = {(name, "", "", ""): with_derived(record, study) for name, record in (records or {}).items()}
+    read = read_runs(study, plant, lambda run: _log(run, folder, logs, study)) if runs else ()
     hardware = read_hardware(study, plant, rig, [log.provenance.rig or "" for log in logs.values()])
     rig = with_noise(rig, read)
     if fixed is not None:
@@ -155,7 +155,7 @@ def load_study(
     )
 
 
-def _log(run: Section, folder: Path, logs: dict[tuple[str, ...], Record]) -> Record:
+def _log(run: Section, folder: Path, logs: dict[tuple[str, ...], Record], study: Section) -> Record:
     """Record of the file a run names, read once."""
     from upright.readers import read
 
@@ -171,7 +171,8 @@ def _log(run: Section, folder: Path, logs: dict[tuple[str, ...], Record]) -> Rec
         with run.at("reader" if reader else "file"):
             record = read(file, reader=reader or None, counted=counts_rows(unit))
         with run.at("time_unit" if unit else "time"):
-            logs[key] = with_time_unit(record.replace(t=record[time]) if time else record, unit)
+            record = with_time_unit(record.replace(t=record[time]) if time else record, unit)
+        logs[key] = with_derived(record, study)
     return logs[key]
 
 

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.browser.answers import five_digits, thinned
 from upright.browser.messages import SWEEP
 from upright.browser.rig import HARDWARE, BenchRig
 from upright.errors import BadInput, UprightError
@@ -27,8 +28,6 @@ from upright.experiments.frequency_1b.one_by_one import (
 )
 from upright.experiments.stand.live import live_stand
 from upright.experiments.stand.step import StepSignal, modes, predicted_step, reading, step_signal
-from upright.records import Array
-from upright.report.drawing import decimated
 from upright.running.run import RunRequest
 from upright.signals.free_swing import Decay
 
@@ -121,7 +120,7 @@ class Recording:
             "omega": decayed.omega_n, "omega_error": NORMAL * decayed.omega_error, "zeta": decayed.zeta,
             "zeta_error": NORMAL * decayed.sigma_error / decayed.omega_n,
         }  # fmt: skip
-        return {**facts, "measured": [_thinned(t, y) for y in self._y[:came].T], "reading": read}
+        return {**facts, "measured": [thinned(t, y, BUCKETS) for y in self._y[:came].T], "reading": read}
 
     def _model(self) -> Facts:
         """What the rig as it is known would show."""
@@ -131,10 +130,10 @@ class Recording:
             response = modelled(rig, at, omega)
             angle = np.degrees(np.unwrap(np.angle(response), axis=0))
             angle -= 360 * np.round((np.median(angle, axis=0) + 90) / 360)
-            return {"line": {"omega": _short(omega), "dB": [_short(v) for v in 20 * np.log10(np.abs(response)).T],
-                             "deg": [_short(v) for v in angle.T]}}  # fmt: skip
+            return {"line": {"omega": five_digits(omega), "dB": [five_digits(v) for v in 20 * np.log10(np.abs(response)).T],
+                             "deg": [five_digits(v) for v in angle.T]}}  # fmt: skip
         t = np.arange(plan.samples.size, dtype=np.float64) * plan.period
-        return {"predicted": [_thinned(t, y) for y in predicted_step(plan, rig, at).T],
+        return {"predicted": [thinned(t, y, BUCKETS) for y in predicted_step(plan, rig, at).T],
                 "modes": {name: list(values) for name, values in modes(rig, at).items()}}  # fmt: skip
 
     def _points(self, sines: Sequence[Sine]) -> list[Facts]:
@@ -148,9 +147,9 @@ class Recording:
         angle = np.degrees(np.angle(data.response))
         angle += 360 * np.round((model - angle) / 360)
         return [
-            {"omega": float(data.omega[k]), "dB": _short(gain[k]), "deg": _short(angle[k]),
-             "dB_error": _short(20 / math.log(10) * error[k]),
-             "deg_error": _short(np.degrees(error[k])), "settled": s.settled}
+            {"omega": float(data.omega[k]), "dB": five_digits(gain[k]), "deg": five_digits(angle[k]),
+             "dB_error": five_digits(20 / math.log(10) * error[k]),
+             "deg_error": five_digits(np.degrees(error[k])), "settled": s.settled}
             for k, s in enumerate(sines)
         ]  # fmt: skip
 
@@ -191,13 +190,3 @@ class Recording:
                 with self._lock:
                     self._sines.append(measured)
             self._tried += 1
-
-
-def _short(values: Array) -> list[float | None]:
-    """Five digits of each; None where there is no number, which JSON cannot hold, as of a gain of 0 in dB."""
-    return [float(f"{v:.5g}") if math.isfinite(v) else None for v in values.tolist()]
-
-
-def _thinned(t: Array, y: Array) -> list[list[float | None]]:
-    times, values = decimated(t, y, BUCKETS)
-    return [_short(column) for column in (times, values)]

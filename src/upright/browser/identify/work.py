@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from upright.browser.answers import thinned
 from upright.browser.identify.bounded import finish
 from upright.browser.identify.reading import record_named
 from upright.errors import BadInput
@@ -22,8 +23,7 @@ from upright.identification.model.runs import FITTED_SHARE, LEAST_RUN
 from upright.physics import Plant
 from upright.progress import Progress
 from upright.quantities import with_unit
-from upright.records import Array, Record
-from upright.report.drawing import decimated
+from upright.records import Record
 from upright.report.fit.chapter import chapter
 from upright.report.fit.tables import parameter_table
 from upright.report.html import tone, write_html
@@ -153,8 +153,8 @@ def _curves(plant: type[Plant], runs: Mapping[str, RunScore], buckets: int = BUC
             "run": label, "role": score.role, "signal": name, "unit": units.get(name, ("", name))[0],
             "meaning": units.get(name, ("", name))[1], "fit": percent(score.fit_percent.get(name, math.nan)),
             "from": float(score.t[0]) + score.score_from, "ahead": score.horizon or 0.0,
-            "measured": _thinned(score.t, score.y[:, k], buckets),
-            "predicted": _thinned(score.t, score.simulated[:, k], buckets),
+            "measured": thinned(score.t, score.y[:, k], buckets),
+            "predicted": thinned(score.t, score.simulated[:, k], buckets),
         }
         for label, score in runs.items() for k, name in enumerate(score.measured)
     ]  # fmt: skip
@@ -164,8 +164,3 @@ def _shown(runs: Mapping[str, RunScore]) -> Mapping[str, RunScore]:
     """The runs that test the model; where none does, those that were fitted."""
     predicted = {label: score for label, score in runs.items() if score.role == "predict"}
     return predicted or runs
-
-
-def _thinned(t: Array, y: Array, buckets: int) -> list[list[float | None]]:
-    times, values = decimated(t, y, buckets)
-    return [[float(f"{v:.5g}") if math.isfinite(v) else None for v in column] for column in (times, values)]

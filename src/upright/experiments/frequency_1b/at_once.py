@@ -21,7 +21,7 @@ from upright.experiments.frequency_1b.run import LoggedResponse, LogRequest, res
 from upright.experiments.stand.fits import fit_study
 from upright.experiments.stand.known import Known
 from upright.experiments.stand.stand import TestStand, file_of
-from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL
+from upright.experiments.stand.strength import GROWTH, OF_TRAVEL, REACH, SHARE, STILL, swinging
 from upright.experiments.stand.studies import write_study
 from upright.identification.frequency.spectra import multisine, odd_lines
 from upright.identification.model.fit import Fit
@@ -61,7 +61,7 @@ def band_and_reach(stand: TestStand) -> tuple[tuple[float, float], Array]:
     if stand.make is not None:
         (low, high), reach = stand.make.band, np.array(stand.make.reach)
     else:
-        swings = [abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)]
+        swings = [abs(p) for p in swinging(linear.poles().tolist())]
         if not swings:
             raise BadInput(
                 f"{model.name} does not swing about '{at}', and the band of its excitation follows from its "

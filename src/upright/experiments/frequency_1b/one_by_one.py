@@ -17,7 +17,7 @@ from upright.errors import BadInput
 from upright.experiments.frequency_1b.at_once import band_and_reach
 from upright.experiments.frequency_1b.sweeps import grid
 from upright.experiments.stand.stand import TestStand
-from upright.experiments.stand.strength import SHARE, STILL
+from upright.experiments.stand.strength import SHARE, STILL, swinging
 from upright.identification.frequency.detection import Tone, detect
 from upright.identification.frequency.response import FrequencyResponse
 from upright.identification.frequency.spectra import from_tones
@@ -89,7 +89,7 @@ def stepped_sines(stand: TestStand, count: int = COUNT) -> SteppedSines:
     band, reach = band_and_reach(stand)
     lengths = grid(*band, count, rig.period)
     omega: Array = 2 * math.pi / (lengths * rig.period).astype(np.float64)
-    modes = np.array([abs(p) for p in linear.poles() if abs(p.imag) > 1e-3 * abs(p)])
+    modes = np.abs(swinging(linear.poles().tolist()))
     clear = np.all(np.abs(np.log(omega[:, None] / modes)) > CLEAR, axis=1)
     lengths, omega = lengths[clear], omega[clear]
     moved = np.abs(linear.response(omega)[:, :, 0])

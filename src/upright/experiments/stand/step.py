@@ -10,11 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from upright.control.trial import readings, steps_in_period
 from upright.errors import NotIdentifiable
 from upright.experiments.stand.stand import TestStand
-from upright.experiments.stand.strength import OF_TRAVEL, REACH, SHARE, STILL
+from upright.experiments.stand.strength import OF_TRAVEL, REACH, SHARE, STILL, swinging
 from upright.records import Array
 from upright.rig import Rig
 from upright.signals.free_swing import Decay, decay
@@ -60,10 +61,10 @@ def step_signal(stand: TestStand) -> StepSignal:
     driven = stand.names.index(rig.plant.inputs[0].on)
     reach = REACH[rig.plant.coordinates[driven].unit] if stand.make is None else stand.make.reach[driven]
     reach = min(reach, OF_TRAVEL * stand.travel)
-    slowest = min((abs(p) for p in poles if abs(p.imag) > 1e-3 * abs(p)), default=2 * math.pi)
+    slowest = min(map(abs, swinging(poles.tolist())), default=2 * math.pi)
     wait = round(min(max(SWINGS * 2 * math.pi / slowest, LEAST), MOST) / rig.period)
     still = math.ceil(STILL / rig.period)
-    spring = bool(np.abs(poles).min() > SPRING * np.abs(poles).max())
+    spring = _comes_back(poles)
     if spring:
         rest = abs(float((linear.C @ np.linalg.solve(-linear.A, linear.B))[driven, 0]))
         level = min(SHARE * rig.limit, reach / rest)
@@ -76,6 +77,10 @@ def step_signal(stand: TestStand) -> StepSignal:
     samples = np.concatenate([np.zeros(still), np.full(push, level), np.full(push, -level), np.zeros(wait)])
     begin = still + 2 * push
     return StepSignal(samples=samples, spans=((begin, begin + wait),), period=rig.period, spring=False)
+
+
+def _comes_back(poles: NDArray[np.complex128]) -> bool:
+    return bool(np.abs(poles).min() > SPRING * np.abs(poles).max())
 
 
 def _breaks_away(rig: Rig) -> float:
@@ -136,12 +141,11 @@ def modes(rig: Rig, at: str) -> dict[str, tuple[float, float]]:
     # what holds it acts where the drive does, with as much as leaves it no acceleration
     held = A - np.outer(B / B[row], A[row])
     matrices = {"free": A}
-    if np.abs(linear.poles()).min() <= SPRING * np.abs(linear.poles()).max():
+    if not _comes_back(linear.poles()):
         matrices["held"] = np.delete(np.delete(held, [row - 1, row], 0), [row - 1, row], 1)
     out: dict[str, tuple[float, float]] = {}
     for name, matrix in matrices.items():
-        swings = [p for p in np.linalg.eigvals(matrix).tolist() if abs(p.imag) > 1e-3 * abs(p)]
-        if swings:
+        if swings := swinging(np.linalg.eigvals(matrix).tolist()):
             slowest = min(swings, key=abs)
             out[name] = (abs(slowest), -slowest.real / abs(slowest))
     return out

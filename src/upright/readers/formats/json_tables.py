@@ -7,11 +7,11 @@ that says more. JSON of one object a line is read with the other texts whose row
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from upright.errors import BadInput
 from upright.readers.formats.delimited import begins_with_number, of_columns
 from upright.readers.reader import Reader
 from upright.readers.source import Source
@@ -21,6 +21,7 @@ from upright.records.columns import time_scale
 _LEAST = 4
 """Rows of what counts as a table."""
 _DEEPEST = 6
+_HEAD = 1 << 10
 
 
 @dataclass(frozen=True)
@@ -141,14 +142,13 @@ def _cell(source: Source, name: str, row: int, value: Any) -> str:
 
 
 def _recognises(source: Source) -> bool:
-    begins = source.data[:64].removeprefix(b"\xef\xbb\xbf").lstrip()
-    if not begins.startswith((b"{", b"[")):
+    """Whether it begins as JSON does, and is not one object a line."""
+    if not source.data[:64].removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"[")):
         return False
-    try:
-        json.loads(source.text)
-    except (ValueError, RecursionError, BadInput):
-        return begins.startswith((b"[{", b"[\n", b"{\n"))  # torn, most likely: its own reader says where
-    return True
+    first, _, more = source.text.lstrip().partition("\n")
+    if first.startswith("["):
+        return re.match(r"\[\s*[\[{]", source.text.lstrip()[:_HEAD]) is not None
+    return not (first.rstrip(", ").endswith("}") and more.strip())
 
 
 READER = Reader(name="json", files="tables in JSON", recognises=_recognises, read=read, order=28)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +17,8 @@ from upright.study import expressions
 from upright.study.text import TomlTable, toml
 from upright.units import same_dimension, scale
 
+NAME = "theta"
+"""Column that is computed."""
 ROUND = 0.02
 """What a marker's distance from the middle may vary by, of the radius (rms), for its path to be an arc."""
 SHORTEST = 0.3
@@ -37,19 +39,18 @@ class DerivedAngle:
     unit: str
     of: tuple[str, ...]
     doubt: str
-    name: str = field(default="theta")
 
     def in_place(self, record: Record) -> Record:
         """The record with this column instead of those that it is computed from."""
         angle = expressions.evaluate(self.formula, record.signals, record.t)
         left = {name: values for name, values in record.signals.items() if name not in self.of}
         units = {name: record.units[name] for name in left}
-        return record.replace(signals={**left, self.name: angle}, units={**units, self.name: self.unit})
+        return record.replace(signals={**left, NAME: angle}, units={**units, NAME: self.unit})
 
     @property
     def table(self) -> TomlTable:
         """As a study states it."""
-        table = TomlTable(f"[columns.{self.name}]")
+        table = TomlTable(f"[columns.{NAME}]")
         table.line(f"formula = {toml(self.formula)}   # {self.doubt}")
         table.key("unit", self.unit)
         return table
@@ -60,7 +61,7 @@ def derived_angle(record: Record, inspection: Inspection, *, places: bool) -> De
 
     `places`: whether columns of the log are places already, so that no speed has to be integrated.
     """
-    if "theta" in record.signals or any(c.drive for c in inspection.columns) or record.inputs:
+    if NAME in record.signals or any(c.drive for c in inspection.columns) or record.inputs:
         return None
     moves = [c for c in inspection.columns if not c.constant]
     for pair in combinations([c for c in moves if _AXIS.search(c.name)], 2):

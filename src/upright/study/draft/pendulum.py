@@ -15,6 +15,7 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 
 import numpy as np
 
+from upright.identification.model.runs import FITTED_SHARE
 from upright.physics import Plant, find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
@@ -352,8 +353,9 @@ def _runs(record: Record, recognised: Recognised, file: str, label: str, *, bala
     split = start + 0.6 * (stop - start)
     if recognised.drive is None and recognised.frequency * (stop - start) / (2 * np.pi) > 12:
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
-    if not balanced and _acts_in_both(record, recognised, driven := start + 2 / 3 * (stop - start)):
-        return run_tables(file, [(f"{label} start", start, driven, "fit"), (f"{label} tail", driven, stop, "predict")])
+    split = start + FITTED_SHARE * (stop - start)
+    if not balanced and _acts_in_both(record, recognised, split):
+        return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
     return run_tables(file, [(label, start, stop, "fit")])
 
 
