@@ -130,7 +130,8 @@ class Recording:
             response = modelled(rig, at, omega)
             angle = np.degrees(np.unwrap(np.angle(response), axis=0))
             angle -= 360 * np.round((np.median(angle, axis=0) + 90) / 360)
-            return {"line": {"omega": five_digits(omega), "dB": [five_digits(v) for v in 20 * np.log10(np.abs(response)).T],
+            gain = 20 * np.log10(np.abs(response))
+            return {"line": {"omega": five_digits(omega), "dB": [five_digits(v) for v in gain.T],
                              "deg": [five_digits(v) for v in angle.T]}}  # fmt: skip
         t = np.arange(plan.samples.size, dtype=np.float64) * plan.period
         return {"predicted": [thinned(t, y, BUCKETS) for y in predicted_step(plan, rig, at).T],
