@@ -24,6 +24,8 @@ export class Answers {
   private hands: Hand[];
   private waiting: Question | undefined;
   private busy = false;
+  /** Whether the newest question is still open. */
+  open = false;
 
   constructor(rig: string, private readonly answered: (fates: Fate[], milliseconds: number) => void) {
     this.hands = workers(rig);
@@ -31,6 +33,7 @@ export class Answers {
 
   async ask(...question: Question): Promise<void> {
     this.waiting = question;
+    this.open = true;
     if (this.busy) return;
     this.busy = true;
     while (this.waiting) {
@@ -40,6 +43,7 @@ export class Answers {
         this.hands = alone();
         return this.shared(settings, gains);
       });
+      this.open = this.waiting !== undefined;
       this.answered(fates, performance.now() - start);
     }
     this.busy = false;

@@ -37,6 +37,8 @@ export class Design {
   private settings = { friction: 1, delay: DATA.delay };
   private share: number | undefined;
   private confirming = false;
+  /** Pressed before the rigs had run with these poles. */
+  private pressed = false;
   private predicted: Float64Array[] = [];
   private fates: Fate[] = [];
   private regulator!: Regulator;
@@ -188,6 +190,7 @@ export class Design {
     this.predicted = this.twin.advance(Math.round(AHEAD / DATA.period));
     this.charts();
     void this.answers.ask({ ...this.twin.settings, holding: true }, this.twin.gains);
+    byId("share").setAttribute("aria-busy", "true");
   }
 
   private answered(fates: Fate[], milliseconds: number): void {
@@ -201,6 +204,8 @@ export class Design {
     this.sticks();
     this.before(milliseconds);
     this.gate();
+    byId("share").setAttribute("aria-busy", `${this.answers.open}`);
+    if (this.pressed && !this.answers.open) this.apply();
   }
 
   private sticks(): void {
@@ -262,11 +267,14 @@ export class Design {
 
   private confirm(on: boolean): void {
     this.confirming = on;
+    this.pressed = false;
     this.gate();
   }
 
   private apply(): void {
     const why = byId("apply").dataset["why"], hardware = this.session.scene?.kind === "HARDWARE";
+    this.pressed = this.answers.open; // what is applied is what was judged
+    if (this.pressed) return;
     if (why) message(why);
     else if (hardware && !this.confirming) this.confirm(true);
     else {

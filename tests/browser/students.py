@@ -85,7 +85,13 @@ class Student:
 
     def reads(self, selector: str, text: str) -> None:
         """Wait until something visible says a text."""
-        self.page.locator(selector, has_text=re.compile(text)).first.wait_for(state="visible")
+        try:
+            self.page.locator(selector, has_text=re.compile(text)).first.wait_for(state="visible")
+        except Exception as error:
+            shown = {
+                each: self.page.locator(each).first.inner_text() for each in (selector, "#state", "#message", "#gate")
+            }
+            raise AssertionError(f"{selector} never read {text!r}: {shown}, {self.wrong}") from error
 
     def until(self, wanted: Callable[[], bool]) -> None:
         """Wait for what the page shows nobody, in steps of the browser's clock."""
