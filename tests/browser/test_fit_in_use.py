@@ -19,7 +19,7 @@ from tests.browser.test_served import client
 from upright.basis import RESERVED, TRUSTED
 from upright.browser.identify.fits import COLUMNS, OWN, Identifications
 from upright.browser.identify.fitted import fitted_rig
-from upright.browser.rig import HARDWARE, known_rig
+from upright.browser.rig import HARDWARE, BenchRig, known_rig
 from upright.browser.serve import Bench
 from upright.errors import BadInput
 from upright.laws import of_values
@@ -155,6 +155,25 @@ def test_a_rig_that_can_really_move_gets_another_filter_only_where_that_is_confi
         assert bench.stations[0].rig is before
         assert ask(bench, "api/rigs/furuta/model", page.me, data=b'{"memory": 0.9, "confirm": true}')[0] == 200
         assert bench.stations[0].rig.memory == pytest.approx(0.9)
+
+
+def test_while_another_filter_is_made_everybody_else_is_answered(served, monkeypatch):
+    bench, page, _, _ = served
+    begun, go, make = threading.Event(), threading.Event(), BenchRig.with_memory
+
+    def slow(*given):
+        begun.set()
+        assert go.wait(SOON)
+        return make(*given)
+
+    monkeypatch.setattr(BenchRig, "with_memory", slow)
+    with ThreadPoolExecutor(1) as pool, client(bench) as another:
+        answer = pool.submit(ask, bench, "api/rigs/furuta/model", page.me, data=b'{"memory": 0.9}')
+        assert begun.wait(SOON)
+        another.ask("stop")
+        another.note("state", state="stopped")
+        go.set()
+        assert answer.result(SOON)[0] == 200
 
 
 def test_while_a_law_is_on_its_way_no_other_one_is_begun(served, monkeypatch):

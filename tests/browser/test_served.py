@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import random
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -18,6 +19,7 @@ from tests.browser.runs import RUNNING, SOON, ByHand, felt, settled, station, tw
 from tests.browser.test_frames import decoded
 from upright.browser.guard import COOKIE
 from upright.browser.hub import Hub
+from upright.browser.identify.recording import Recording
 from upright.browser.lease import PATIENCE
 from upright.browser.outbox import FRAMES
 from upright.browser.serve import Bench, open_bench
@@ -118,6 +120,34 @@ def test_there_is_a_list_of_rigs_and_what_each_is_made_of(bench):
         assert headers["content-type"].startswith("text/css" if name.endswith("css") else "text/javascript")
     assert got(bench, "")[0] == 200
     assert json.loads(got(bench, "api/rigs/furuta/runs")[2]) == []
+
+
+def test_while_a_sweep_is_prepared_everybody_else_is_answered_and_a_stop_keeps_it_from_starting(served, monkeypatch):
+    bench, _, carry = served
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(*given):
+        begun.set()
+        assert go.wait(SOON)
+        return Recording(*given)
+
+    monkeypatch.setattr("upright.browser.station.Recording", slow)
+    with client(bench) as one, client(bench) as another:
+        one.ask("operate")
+        one.ask("start", **{"from": "sweep"})
+        assert begun.wait(SOON)
+        one.ask("start", **{"from": "sweep"})
+        assert "being prepared" in one.note("error")["sentence"]
+        assert got(bench, "api/rigs/furuta/runs")[0] == 200
+        another.ask("stop")
+        another.note("state", state="stopped")
+        go.set()
+        assert "is stopped: Stopped by somebody who watches" in one.note("error")["sentence"]
+        assert carry.orders == []
+        one.ask("rearm")
+        one.ask("start", **{"from": "sweep"})
+        carry.go()
+        assert one.note("state", state="running")["from"] == "sweep"
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from upright.browser.guard import INSTRUCTOR
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import Identifications
 from upright.browser.identify.routes import routes as identify_routes
-from upright.browser.messages import ClientRequest, read
+from upright.browser.messages import MOTIONS, ONE_STEP, SWEEP, ClientRequest, read
 from upright.browser.outbox import Outbox
 from upright.browser.runs import in_own_process, listed
 from upright.browser.station import Station, obey
@@ -40,6 +40,8 @@ PATIENCE = 10
 """Messages in a row that are not understood, or ten times as many that come too fast, before a connection is closed."""
 SWIFTEST = 50.0
 """Messages of a client in a second."""
+APART = {"poles": "the last poles are being placed.", "start": "the last start is being prepared."}
+"""What each client may have one of on its way in a thread, and what the next one meets meanwhile."""
 SCRIPT, STYLE = "text/javascript; charset=utf-8", "text/css; charset=utf-8"
 SHARED = {
     "drawing.js": ("upright.live", "drawing.js", SCRIPT),
@@ -112,11 +114,15 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
 
     async def runs(request: Request) -> Response:
         hub = hubs.get(request.path_params["name"])
-        return nothing() if hub is None else JSONResponse(listed(hub.station.folder, hub.station.rig.name))
+        if hub is None:
+            return nothing()
+        return JSONResponse(await asyncio.to_thread(listed, hub.station.folder, hub.station.rig.name))
 
     async def result(request: Request) -> Response:
         hub = hubs.get(request.path_params["name"])
-        return nothing() if hub is None else _result(hub.station.folder, hub.station.rig.name, request.url.path)
+        if hub is None:
+            return nothing()
+        return await asyncio.to_thread(_result, hub.station.folder, hub.station.rig.name, request.url.path)
 
     async def live(socket: WebSocket) -> None:
         hub = hubs.get(socket.path_params["name"])
@@ -177,7 +183,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
 async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None:
     """Do what a client asks for, until it is gone or asks for nonsense only."""
     wrong, allowed, last, flooded = 0.0, SWIFTEST, time.monotonic(), False
-    placing: asyncio.Task[None] | None = None
+    apart: dict[str, asyncio.Task[None]] = {}
     with suppress(WebSocketDisconnect):
         while wrong < PATIENCE:
             received = await socket.receive()
@@ -194,15 +200,13 @@ async def _listen(socket: WebSocket, hub: Hub, who: str, outbox: Outbox) -> None
                     flooded = True
                     continue
                 allowed, flooded = allowed - 1.0, False
-                if message.do != "poles":
+                kind = _apart(message)
+                if not kind:
                     obey(hub.station, who, message)
-                elif placing is None or placing.done():
-                    try:  # a millisecond, where another thread would be waited for
-                        obey(hub.station, who, ClientRequest(do="poles", fields={**message.fields, "soon": True}))
-                    except TimeoutError:  # takes a while, in which a stop must not wait
-                        placing = asyncio.create_task(_place(hub, who, message, outbox))
-                else:
-                    raise BadInput("the last poles are being placed.")
+                elif kind in apart and not apart[kind].done():
+                    raise BadInput(APART[kind])
+                elif kind != "poles" or not _soon(hub, who, message):
+                    apart[kind] = asyncio.create_task(_obey_apart(hub, who, message, outbox))
                 wrong = 0.0
             except UprightError as error:
                 wrong += 1.0
@@ -228,7 +232,23 @@ async def _listen_to_instructor(socket: WebSocket, grid: Overview, outbox: Outbo
         await socket.close(4400, "ten messages in a row were not understood")
 
 
-async def _place(hub: Hub, who: str, message: ClientRequest, outbox: Outbox) -> None:
+def _apart(message: ClientRequest) -> str:
+    """What a request is called that may take a while, in which a stop must not wait; empty for others."""
+    if message.do == "start" and message.fields.get("from") not in (MOTIONS, SWEEP, ONE_STEP):
+        return ""
+    return message.do if message.do in APART else ""
+
+
+def _soon(hub: Hub, who: str, message: ClientRequest) -> bool:
+    """Whether poles could be placed in a millisecond, where another thread would be waited for."""
+    try:
+        obey(hub.station, who, ClientRequest(do="poles", fields={**message.fields, "soon": True}))
+    except TimeoutError:
+        return False
+    return True
+
+
+async def _obey_apart(hub: Hub, who: str, message: ClientRequest, outbox: Outbox) -> None:
     try:
         await asyncio.to_thread(obey, hub.station, who, message)
     except UprightError as error:

@@ -175,38 +175,35 @@ class Station:
         BadInput
             When it may not be started now, or so.
         """
-        self._operated(who)
-        if self.state == STOPPED:
-            raise BadInput(f"{self.rig.name} is stopped: {self.why} Arm it again first.")
-        if self.state not in (IDLE, ENDED):
-            raise BadInput(f"{self.rig.name} runs already.")
+        rig = self.rig
+        self._may_start(who, rig)
         if not 0 < seconds <= LONGEST:
             raise BadInput(f"a run takes more than 0 and at most {LONGEST:g} s, got {seconds:g} s.")
-        if self.rig.kind == HARDWARE and self.rig.basis.level == NOT_TRUSTED and not accept.strip():
-            raise BadInput(f"its model is not trusted: {self.rig.basis.sentence} Say why it runs all the same.")
+        if rig.kind == HARDWARE and rig.basis.level == NOT_TRUSTED and not accept.strip():
+            raise BadInput(f"its model is not trusted: {rig.basis.sentence} Say why it runs all the same.")
         if origin != HELD and start:
             raise BadInput("nobody's hand brings it away from where it hangs.")
         if origin == HANGING and (why := self.hanging):
             self.prepare()
             raise BadInput(why)
-        recording = Recording(self.rig, origin) if origin in (SWEEP, ONE_STEP) else None
+        recording = Recording(rig, origin) if origin in (SWEEP, ONE_STEP) else None
         if recording is not None or origin == MOTIONS:
-            request = first_motions(self.rig) if recording is None else recording.request
+            request = first_motions(rig) if recording is None else recording.request
             seconds = request.seconds
         else:
             swings = origin == HANGING
             request = RunRequest(
-                rig=self.rig.rig_path, law=self._swing_path if swings else self.rig.law_path, seconds=seconds,
+                rig=rig.rig_path, law=self._swing_path if swings else rig.law_path, seconds=seconds,
                 tilt=0.0 if swings else self._tilt(start), from_rest=swings, accept=accept,
-                steered=self.rig.follows and not swings,
+                steered=rig.follows and not swings,
             )  # fmt: skip
-        desk = self._new_desk(request)
         with self._lock:
+            self._may_start(who, rig)  # what a recording needs takes a while, in which somebody may have stopped it
+            desk = self._new_desk(request)
             self.why, self.verdict, self.seconds, self._accepted = "", "", seconds, accept.strip()
-            self.origin = origin  # before the desk, by which a new scene is made
-            self.last, self.desk = RunState(phase="starting"), desk
+            self.origin, self.loop = origin, rig.loop if origin == HELD else None
             self.recording = recording or self.recording
-            self.loop = self.rig.loop if origin == HELD else None
+            self.last, self.desk = RunState(phase="starting"), desk  # after what a scene shows: a new desk is a new one
             self.state, self.over, self._ending = STARTING, False, False
         # the system ends the loop's process with the thread that started it, which waits for it
         every = (request, desk, recording)
@@ -318,6 +315,15 @@ class Station:
         with self._lock:
             if rig.model is self.rig.model:  # a design takes seconds, in which another description may have come
                 self._held_by, self.hanging = gains, why
+
+    def _may_start(self, who: str, rig: BenchRig) -> None:
+        self._operated(who)
+        if self.state == STOPPED:
+            raise BadInput(f"{rig.name} is stopped: {self.why} Arm it again first.")
+        if self.state not in (IDLE, ENDED):
+            raise BadInput(f"{rig.name} runs already.")
+        if self.rig is not rig:
+            raise BadInput(f"{rig.name} has another model since this start was requested; start it again.")
 
     def _operated(self, who: str) -> None:
         if self.lease.holder != who:

@@ -16,7 +16,8 @@ from upright.browser.answers import nothing, report_page, sentence_of
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Identifications
 from upright.browser.messages import LONGEST
-from upright.browser.rig import HARDWARE
+from upright.browser.rig import HARDWARE, BenchRig
+from upright.browser.station import Station
 from upright.errors import BadInput, UprightError
 
 WHO = "x-bench-me"
@@ -52,7 +53,8 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
     async def written(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
         key, _, end = request.path_params["file"].rpartition(".")
-        if own is None or end not in FILES or (path := own.file(key, FILES[end])) is None:
+        path = None if own is None or end not in FILES else await asyncio.to_thread(own.file, key, FILES[end])
+        if path is None:
             return nothing()
         if end == "html":
             return report_page(path)
@@ -112,9 +114,7 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
             raise BadInput("its law is being designed for another model already; wait until that is there.")
         adopting.add(name)
         try:
-            rig = station.rig if key is None else await asyncio.to_thread(own.described_by, key)
-            if memory is not None:
-                rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
+            rig = await asyncio.to_thread(_chosen, station, own, key, memory)
             station.describe(request.headers.get(WHO, ""), rig)
         finally:
             adopting.discard(name)
@@ -164,6 +164,15 @@ def _model_named(text: bytes) -> tuple[str | None, float | None, bool]:
             'its velocities by {"memory": 0.8}.'
         )
     return key, memory, confirm
+
+
+def _chosen(station: Station, own: Identifications, key: str | None, memory: float | None) -> BenchRig:
+    """The rig by another fit, by another filter, or both."""
+    rig = station.rig if key is None else own.described_by(key)
+    if memory is not None:
+        rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
+    _ = rig.scene  # which is computed once, and by the server's loop if not here
+    return rig
 
 
 def _operates(hub: Hub, who: str) -> None:
