@@ -31,6 +31,8 @@ export interface Scene {
   basis: { level: string; sentence: string };
   /** Which fit of the bench describes it, and of which log that is; "" where its own RIG.toml does. */
   model: { fit: string; of: string };
+  /** How the rig was used when the bench last ran, and what to request to have it so again, where it is not. */
+  last_use: { sentence: string; offer: { fit?: string; memory?: number } | null } | null;
   /** Of the filter that gives the law its velocities, 0 for plain differences; null where it has others. */
   memory: number | null;
   /** Why no page can move it by itself; "" where one can. */

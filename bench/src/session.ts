@@ -60,7 +60,7 @@ export class Session {
   }
 
   /** Lets a fit describe the rig, or what came with it where that is ""; or another filter give velocities; why not, or "". */
-  async describe(by: { fit: string } | { memory: number }): Promise<string> {
+  async describe(by: { fit?: string; memory?: number }): Promise<string> {
     if (this.unsteerable) return this.unsteerable;
     const hardware = this.scene?.kind === "HARDWARE";
     if (hardware && !confirm("This changes what drives a real rig. Use it from the next start on?")) return "Nothing was changed.";

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,9 @@ from tests.browser.test_served import client
 from upright.basis import RESERVED, TRUSTED
 from upright.browser.identify.fits import COLUMNS, OWN, Identifications
 from upright.browser.identify.fitted import fitted_rig
+from upright.browser.identify.last_use import keep_use
 from upright.browser.rig import HARDWARE, BenchRig, known_rig
-from upright.browser.serve import Bench
+from upright.browser.serve import TWIN, Bench
 from upright.errors import BadInput
 from upright.laws import of_values
 from upright.rig.makes import make_rig
@@ -196,6 +198,112 @@ def test_while_a_law_is_on_its_way_no_other_one_is_begun(served, monkeypatch):
     assert use(bench, page.me, "fit-1")[0] == 200
 
 
+def copied(_task, _path, law):
+    """Stands for the design of a law: the paper's gains, in its place."""
+    law.write_bytes((law.parents[2] / "law.json").read_bytes())
+    return ""
+
+
+@pytest.fixture
+def next_bench(tmp_path, monkeypatch):
+    """Opens one bench after the other on the same folder."""
+    monkeypatch.setattr("upright.browser.identify.fitted.in_own_process", copied)
+    path = tmp_path / "RIG.toml"
+    path.write_text(TWIN, encoding="utf-8")
+
+    @contextmanager
+    def opened(how=lambda rig: rig):
+        rig, carry = how(known_rig(path, None, tmp_path)), ByHand()
+        with Bench([rig], tmp_path, carry=carry, report=lambda *_: "") as bench, client(bench) as page:
+            yield bench, page, carry
+            if not bench.stations[0].over:
+                carry.end()
+
+    return opened
+
+
+def request(bench, page, **what):
+    return ask(bench, "api/rigs/furuta/model", page.me, data=json.dumps(what).encode())[::2]
+
+
+def used(next_bench, tmp_path):
+    """A rig that was used with a fit and another filter, when a bench has closed."""
+    written_fit(tmp_path / "furuta", "fit-1")
+    with next_bench() as (bench, page, _):
+        assert page.scene["last_use"] is None
+        assert request(bench, page, fit="fit-1", memory=0.8)[0] == 200
+        return bench.stations[0].rig, page.note("scene", memory=0.8)
+
+
+def test_the_next_bench_uses_a_twin_as_it_was_used_last_until_it_is_used_as_it_came(next_bench, tmp_path):
+    last, scene = used(next_bench, tmp_path)
+    with next_bench() as (bench, page, carry):
+        again = page.scene
+        assert {n: again[n] for n in ("model", "memory", "K", "basis")} == {
+            n: scene[n] for n in ("model", "memory", "K", "basis")
+        }
+        assert (
+            "the fit of run of yesterday and the velocity filter a = 0.8, and so it is" in again["last_use"]["sentence"]
+        )
+        assert again["last_use"]["offer"] is None
+        page.ask("operate")
+        page.ask("start")
+        carry.go()
+        law = of_values(carry.orders[0].law)
+        assert all(np.array_equal(getattr(law, n), getattr(last.law, n)) for n in ("A", "B", "C", "D"))
+        carry.end()
+        page.note("state", state="ended")
+        assert request(bench, page, fit="")[0] == 200
+        assert page.note("scene", model={"fit": "", "of": ""})["last_use"] is None
+    with next_bench() as (_, page, _):
+        assert (page.scene["model"]["fit"], page.scene["memory"], page.scene["last_use"]) == ("", 0.5, None)
+
+
+def rewritten(path, change):
+    path.write_text(change(path.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+OFFER = {"fit": "fit-1", "memory": 0.8}
+
+
+@pytest.mark.parametrize(
+    ("what", "why", "then"),
+    [("RIG.toml", "has changed since", ""), ("furuta/fits/fit-1/law.json", "has changed since", ""),
+     ("furuta/fits/fit-1/fit.json", "has changed since", "not trusted"),
+     ("hardware", "until you confirm", "confirm it"), ("furuta/fits/fit-1/fit-1.json", "no longer there", None),
+     ("furuta/last_use.json", "cannot be read", None)],
+)  # fmt: skip
+def test_what_has_changed_or_can_really_move_is_as_it_came_and_the_last_use_at_most_offered(
+    next_bench, tmp_path, what, why, then
+):
+    used(next_bench, tmp_path)
+    if what.endswith(("fit-1.json", "use.json")):
+        rewritten(tmp_path / what, lambda text: "{}" if "use" in what else text.replace('"fit-1"', '"fit-2"'))
+    elif what != "hardware":
+        rewritten(tmp_path / what, lambda text: text.replace('"trusted": true', '"trusted": false') + "\n")
+    with next_bench(hardware if what == "hardware" else lambda rig: rig) as (bench, page, _):
+        assert (page.scene["model"]["fit"], page.scene["memory"]) == ("", 0.5)
+        assert why in page.scene["last_use"]["sentence"]
+        assert page.scene["last_use"]["offer"] == (None if then is None else OFFER)
+        if then is None:
+            return
+        status, text = request(bench, page, **OFFER)
+        assert (status, then in text) == (400 if then else 200, True), text
+        if not then:
+            assert page.note("scene", memory=0.8)["model"]["fit"] == "fit-1"
+
+
+def test_a_fit_that_is_no_longer_trusted_is_not_used_again_though_no_file_has_changed(next_bench, tmp_path):
+    last, _ = used(next_bench, tmp_path)
+    rewritten(tmp_path / "furuta/fits/fit-1/fit.json", lambda text: text.replace('"trusted": true', '"trusted": false'))
+    keep_use(last, known_rig(tmp_path / "RIG.toml", None, tmp_path), tmp_path / "furuta")
+    with next_bench() as (_, page, _):
+        assert page.scene["model"]["fit"] == ""
+        assert (
+            "cannot be used now: this fit cannot be used, since it is not trusted" in page.scene["last_use"]["sentence"]
+        )
+
+
 REAL = """kind = "serial"
 port = "/dev/ttyACM0"
 name = "furuta"
@@ -255,11 +363,17 @@ def test_a_student_takes_a_fit_into_use_by_keyboard_and_goes_back(chromium, tmp_
             one.reads("#message", "stop it first")
             page.click("#end")
             one.sees("ended")
+            server.kill()
+            one.sees("lost")
+            server.open()
+            one.reads("#message", "with the fit of run of yesterday, and so it is again")
+            one.reads("#identify .in-use", "fit of run of yesterday")
             tab_to(page, "#nominal")
             page.keyboard.press("Enter")
             one.reads("#identify .in-use", "nominal model")
             another.reads("#run .in-use", "nominal model")
+            assert not page.locator("#last-use").is_visible()
             one.leaves()
-            assert one.wrong == another.wrong == []
+            assert [w for w in one.wrong + another.wrong if "ERR_CONNECTION" not in w] == []
     finally:
         server.close()

@@ -24,6 +24,7 @@ from upright.browser.classroom.room import Classroom
 from upright.browser.guard import INSTRUCTOR
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import Identifications
+from upright.browser.identify.last_use import take_up
 from upright.browser.identify.routes import routes as identify_routes
 from upright.browser.messages import MOTIONS, ONE_STEP, SWEEP, ClientRequest, read
 from upright.browser.outbox import Outbox
@@ -69,8 +70,10 @@ def is_built() -> bool:
 
 def application(stations: Sequence[Station], room: Classroom | None = None) -> Starlette:
     """The bench of some rigs, which may be those of a class."""
+    fits = {station.rig.name: Identifications(station.rig, station.folder) for station in stations}
+    for station in stations if room is None else ():
+        station.take_up(*take_up(station.rig, fits[station.rig.name], station.folder))
     hubs = {station.rig.name: Hub(station) for station in stations}
-    fits = {name: Identifications(hub.station.rig, hub.station.folder) for name, hub in hubs.items()}
     grid = None if room is None else Overview(room)
     rate = RATE if grid is None else RATE_OF_CLASS
     scripts: dict[Path, asyncio.Task[str]] = {}

@@ -27,7 +27,7 @@ class Hub:
         self.station = station
         self.clients: dict[Outbox, str] = {}
         self._issued: dict[str, None] = {}  # who has been here, the oldest first
-        self._rig, self._step = station.rig, _step(station)
+        self._rig, self._last_use, self._step = station.rig, station.last_use, _step(station)
         self._next, self._late, self._answered, self._followed, self._desk = 0, 0, 0, 0, station.desk
         self._shown: Any = None
         self._scene = self._described()
@@ -59,8 +59,8 @@ class Hub:
     def turn(self) -> None:
         """Send what is new."""
         self.station.beat()
-        if self.station.rig is not self._rig:
-            self._rig, self._step = self.station.rig, _step(self.station)
+        if self.station.rig is not self._rig or self.station.last_use is not self._last_use:
+            self._rig, self._last_use, self._step = self.station.rig, self.station.last_use, _step(self.station)
             self._scenes()
         self._samples()
         self._answer()
@@ -135,7 +135,8 @@ class Hub:
             _, reference, tick, target = followed
             changed["reference"] = {"value": reference.size, "shape": reference.shape, "period": reference.period,
                                     "tick": tick, "about": list(target[: len(rig.model.per_unit)])}  # fmt: skip
-        return json.dumps({**rig.scene, **changed})
+        last_use = None if station.last_use is None else station.last_use.plain()
+        return json.dumps({**rig.scene, **changed, "last_use": last_use})
 
     def _scene_of(self, who: str) -> str:
         return f'{self._scene[:-1]}, "you": {json.dumps(who)}}}'

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from upright.basis import NOT_TRUSTED
 from upright.browser.hanging import first_motions, swing_up_apart
+from upright.browser.identify.last_use import LastUse
 from upright.browser.identify.recording import Recording
 from upright.browser.lease import Lease
 from upright.browser.messages import HANGING, HELD, MOTIONS, ONE_STEP, SWEEP, ClientRequest
@@ -95,6 +96,8 @@ class Station:
         Where the run, or the last one, began: `HELD`, `HANGING` for a swing-up, `MOTIONS` to be identified, and so on.
     recording : Recording or None
         The last sweep or step.
+    last_use : LastUse or None
+        How it was used when the bench last ran, until it is described otherwise.
     loop, requested : Loop or None
         The law that runs as state feedback, and the one that was asked for last; a swing-up is none.
     desk : RunDesk or None
@@ -124,6 +127,7 @@ class Station:
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
         self._new_desk = desk
         self.recording: Recording | None = None
+        self.last_use: LastUse | None = None
 
     def beat(self) -> None:
         """Say that somebody can stop it; a run whose server does not answer any more ends by itself."""
@@ -159,8 +163,13 @@ class Station:
             When they do not operate it, or it runs.
         """
         self._operated(who)
+        self.take_up(rig)
+
+    def take_up(self, rig: BenchRig, last_use: LastUse | None = None) -> None:
+        """The same as it was used before, by nobody's request."""
         with self._lock:
             self.at_rest()
+            self.last_use = last_use
             if rig.model is not self.rig.model:  # its swing-up is another one
                 self.hanging, self._held_by, self._designer = NOT_DESIGNED, None, None
             self.rig, self.loop, self.requested, self.origin = rig, rig.loop, None, HELD

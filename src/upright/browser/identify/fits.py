@@ -13,7 +13,7 @@ from typing import Any
 
 from upright.browser.answers import sentence_of
 from upright.browser.identify.bounded import Bounded
-from upright.browser.identify.fitted import fitted_rig
+from upright.browser.identify.fitted import fitted_rig, fitted_rig_again
 from upright.browser.identify.tasks import begin_identification, begin_inspection
 from upright.browser.identify.weighing import BodyWeighing
 from upright.browser.rig import BenchRig
@@ -42,10 +42,15 @@ class Identifications:
     ----------
     carry : callable
         Makes a `Bounded`.
+
+    Attributes
+    ----------
+    came : BenchRig
+        The rig as its own RIG.toml describes it.
     """
 
     def __init__(self, rig: BenchRig, folder: Path, carry: Callable[..., Bounded] = Bounded) -> None:
-        self._rig, self._folder, self._carry = rig, folder, carry
+        self.came, self._folder, self._carry = rig, folder, carry
         self._lock = threading.Lock()
         self._reading = threading.Lock()
         self._job: Bounded | None = None
@@ -92,7 +97,7 @@ class Identifications:
         runs = [
             {"id": run["id"], "own": True, "name": run.get("what", "run"), "started": run["started"],
              "seconds": run["seconds"]}
-            for run in listed(self._folder, self._rig.name) if "log" in run
+            for run in listed(self._folder, self.came.name) if "log" in run
         ]  # fmt: skip
         brought = [_read(path) for path in (self._folder / "uploads").glob("log-*.json")]
         return runs + [{**b, "own": False} for b in sorted(brought, key=lambda b: -b["brought"])]
@@ -115,7 +120,7 @@ class Identifications:
                 raise BadInput("another log is being identified; wait, or interrupt it.")
             taken = [int(p.name.partition("-")[2]) for p in (self._folder / "fits").glob("fit-*")]
             key = f"fit-{max(taken, default=0) + 1}"
-            rig = self._rig.rig_path if known["own"] or of == OWN else None
+            rig = self.came.rig_path if known["own"] or of == OWN else None
             self._job = self._carry(
                 begin_identification, path, name, rig, dict(measured), self._folder / "fits" / key,
                 seconds=FITTING, grace=GRACE, progress=self._progress, show=self._show,
@@ -177,8 +182,14 @@ class Identifications:
         BadInput
             When there is no such fit, it is not of this rig, or it is not trusted.
         """
-        if not key:
-            return self._rig
+        return fitted_rig(self.came, *self._of_rig(key)) if key else self.came
+
+    def described_again(self, key: str) -> BenchRig:
+        """The same with the law that was designed when the fit was first used, as strictly."""
+        return fitted_rig_again(self.came, *self._of_rig(key)) if key else self.came
+
+    def _of_rig(self, key: str) -> tuple[Path, str]:
+        """File of a fit that is of this rig, and what its log is called."""
         fit = next((each for each in self.listed() if each["id"] == key), None)
         if fit is None:
             raise BadInput("there is no such fit; load the page again.")
@@ -187,7 +198,7 @@ class Identifications:
                 "this fit is of a rig that the log's columns tell; if the log is of this rig, choose so and identify "
                 "it again."
             )
-        return fitted_rig(self._rig, self._folder / "fits" / key / "fit.json", fit["name"])
+        return self._folder / "fits" / key / "fit.json", fit["name"]
 
     def close(self) -> None:
         """End what is on its way."""

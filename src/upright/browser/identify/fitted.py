@@ -11,6 +11,8 @@ from upright.browser.runs import in_own_process
 from upright.errors import BadInput
 from upright.study.stored_rig import read_stored_rig
 
+LAW = "law.json"
+
 
 def fitted_rig(rig: BenchRig, fit: Path, of: str) -> BenchRig:
     """The same rig by a fit.json, beside which its RIG.toml and its law are written.
@@ -29,6 +31,18 @@ def fitted_rig(rig: BenchRig, fit: Path, of: str) -> BenchRig:
     BadInput
         When the fit is not trusted, or the rig is one that its own description makes.
     """
+    path = _described(rig, fit)
+    in_own_process(write_proposed_law, path, fit.parent / LAW)
+    return _known(rig, path, of)
+
+
+def fitted_rig_again(rig: BenchRig, fit: Path, of: str) -> BenchRig:
+    """The same with the law that was written before, as strictly."""
+    return _known(rig, _described(rig, fit), of)
+
+
+def _described(rig: BenchRig, fit: Path) -> Path:
+    """RIG.toml of a rig by a fit that may be used."""
     file = rig.file
     basis = read_stored_rig(fit, draws=0).basis
     if basis.level == NOT_TRUSTED:
@@ -38,6 +52,9 @@ def fitted_rig(rig: BenchRig, fit: Path, of: str) -> BenchRig:
             f"{rig.name} is what {file.path.name} describes, and another description would make another rig of it; "
             'name the rig that it truly is, such as make = "furuta".'
         )
-    path, law = file.with_fit(fit, fit.parent / "RIG.toml"), fit.parent / "law.json"
-    in_own_process(write_proposed_law, path, law)
-    return replace(known_rig(path, law, fit.parent), name=rig.name, fit=fit.parent.name, fit_of=of)
+    return file.with_fit(fit, fit.parent / "RIG.toml")
+
+
+def _known(rig: BenchRig, path: Path, of: str) -> BenchRig:
+    known = known_rig(path, path.parent / LAW, path.parent)
+    return replace(known, name=rig.name, fit=path.parent.name, fit_of=of)

@@ -15,6 +15,7 @@ from starlette.routing import Route
 from upright.browser.answers import nothing, report_page, sentence_of
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Identifications
+from upright.browser.identify.last_use import LastUse, keep_use
 from upright.browser.messages import LONGEST
 from upright.browser.rig import HARDWARE, BenchRig
 from upright.browser.station import Station
@@ -116,6 +117,7 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         try:
             rig = await asyncio.to_thread(_chosen, station, own, key, memory)
             station.describe(request.headers.get(WHO, ""), rig)
+            await asyncio.to_thread(_keep, station, own, rig)
         finally:
             adopting.discard(name)
         return JSONResponse({})
@@ -173,6 +175,13 @@ def _chosen(station: Station, own: Identifications, key: str | None, memory: flo
         rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
     _ = rig.scene  # which is computed once, and by the server's loop if not here
     return rig
+
+
+def _keep(station: Station, own: Identifications, rig: BenchRig) -> None:
+    try:
+        keep_use(rig, own.came, station.folder)
+    except OSError as error:  # it is used so all the same
+        station.last_use = LastUse(sentence=f"The next bench will not know how {rig.name} is used now: {error}.")
 
 
 def _operates(hub: Hub, who: str) -> None:

@@ -37,6 +37,7 @@ def _until_closed(bench: Bench) -> Iterator[str]:
     else:
         yield f"{', '.join(bench.rigs)}: {bench.url}"
         yield f"Open this address in a browser; take control, then start. Logs and reports are kept in {bench.folder}"
+    yield from (station.last_use.sentence for station in bench.stations if station.last_use is not None)
     yield "Ctrl-C stops every rig and closes the bench. Keep a stop in hardware within reach: this is software."
     try:
         bench.wait()
