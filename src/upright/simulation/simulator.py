@@ -24,7 +24,7 @@ from upright.laws.rule import Rule
 from upright.physics.actuator import ACTUATOR
 from upright.physics.equations import Derived
 from upright.simulation import gpu
-from upright.simulation.kernel.compiled import WIDTH, Kernel, compiling, kernel
+from upright.simulation.kernel.compiled import WIDTH, Kernel, compiling, kernel, run_words
 from upright.simulation.kernel.flavour import Flavour, Layout, lay_out
 from upright.simulation.kernel.lanes import room
 
@@ -199,20 +199,12 @@ class Simulator:
         """
         width = 1 if params.shape[1] == 1 else WIDTH
         call = self.call(params, x0, u, samples=2, width=width)
-        compiled = self._kernel.run_1 if width == 1 else self._kernel.run_16
-        events = self._kernel.events if self.flavour.dry else 0
-        working = aligned(call.room)
         coordinates = self.derived.coordinates
         locked = [(k, 2 * i) for k, i in enumerate(self.flavour.held) if self.held[coordinates[i]].locked]
-
-        def go() -> None:
-            for k, row in locked:
-                call.base[k] = call.x0[row]
-            compiled(0, call.blocks, *call.arguments, working, events)
-
-        lanes = call.lanes
-        return Stepping(params=call.params[:, :lanes], state=call.x0[:, :lanes], start=call.start[:lanes],
-                        after=call.out[1, :, :lanes], go=go)  # fmt: skip
+        return Stepping(
+            call=call, working=aligned(call.room), locked=tuple(locked), address=self._kernel.address(f"run_{width}"),
+            events=self._kernel.events if self.flavour.dry else 0,
+        )  # fmt: skip
 
     def run(
         self,
@@ -449,15 +441,60 @@ class Call:
 class Stepping:
     """Memory of motions that are stepped by one sample: write what changes, `go`, and read `after`.
 
-    `params` (rows, lanes), `state` (states, lanes) and `start` (lanes,) are what `Simulator.run` takes, `after`
-    (states, lanes) is the state one sample later. Lanes that only fill up a block keep what they began with.
+    Lanes that only fill up a block keep what they began with.
+
+    Attributes
+    ----------
+    call, working, events : Call, array, int
+        What the kernel is called with.
+    locked : tuple of (int, int)
+        Rows of `Call.base` and of the states of the coordinates that stay where they are.
+    address : int
+        Where the compiled loop stands, which takes `words`: for machine code that steps by itself.
     """
 
-    params: Array
-    state: Array
-    start: NDArray[np.int64]
-    after: Array
-    go: Callable[[], None]
+    call: Call
+    working: Array
+    locked: tuple[tuple[int, int], ...]
+    address: int
+    events: int
+
+    @property
+    def params(self) -> Array:
+        """Parameters (rows, lanes)."""
+        return self.call.params[:, : self.call.lanes]
+
+    @property
+    def state(self) -> Array:
+        """States (states, lanes) before the step."""
+        return self.call.x0[:, : self.call.lanes]
+
+    @property
+    def start(self) -> NDArray[np.int64]:
+        """Sample of the input (lanes,) at which each lane steps."""
+        return self.call.start[: self.call.lanes]
+
+    @property
+    def after(self) -> Array:
+        """States (states, lanes) one sample later."""
+        return self.call.out[1, :, : self.call.lanes]
+
+    @cached_property
+    def words(self) -> NDArray[np.int64]:
+        """The arguments of the compiled loop."""
+        return np.frombuffer(run_words(0, self.call.blocks, *self.call.arguments, self.working, self.events), np.int64)
+
+    def go(self) -> None:
+        """Step every lane by one sample."""
+        for k, row in self.locked:
+            self.call.base[k] = self.call.x0[row]
+        self._loop(self.words.tobytes())
+
+    @cached_property
+    def _loop(self) -> Callable[[bytes], None]:
+        from upright.simulation.lowering import machine
+
+        return machine.function(self.address)
 
 
 def ready(a: Array, width: int) -> Array:

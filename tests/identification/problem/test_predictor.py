@@ -18,7 +18,7 @@ from upright.identification.model.grey_box import NOISE
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import discrete_model, gains, restart_states, with_noise
 from upright.laws import state_feedback
-from upright.physics import Furuta
+from upright.physics import Furuta, Pendulum
 from upright.simulation import simulate
 
 VALUES = {
@@ -143,6 +143,27 @@ def test_a_filter_without_friction_is_the_textbook_kalman_filter() -> None:
         P = (np.eye(5) - K @ C) @ P
     scale = small * np.array([0.1, 1.0, 0.1, 1.0, 1.0])
     np.testing.assert_array_less(np.abs(found - x - [0, 0, np.pi, 0, 0]) / scale, 1e-3)
+
+
+def test_a_filter_of_a_pendulum_whose_arm_is_locked_is_that_of_the_pendulum_alone() -> None:
+    alone = {n: VALUES[n] for n in ("m_p", "l_cg", "J_p", "g")} | {"b_2": 1e-5, "b_2c": 1e-5}
+    t = np.arange(2001) * 2e-3
+    swing = simulate(Pendulum, alone, [0.3, 0.0], None, 2e-3, samples=t.size)[:, 0]
+    arm = {n: VALUES[n] for n in ("r", "J_d", "actuator.gain")}
+    fields: dict[str, Any] = {"label": "swing", "role": "fit", "horizon": (0.05,), "restart": "kalman", "unknown": ()}
+    pendulum = Run(t=t, u=np.zeros((t.size, 1)), y=swing, measured=("theta",), resolution=(QUANTUM,), **fields)
+    locked = Run(
+        t=t, u=np.zeros((t.size, 1)), y=np.hstack([np.full_like(swing, 0.7), swing]), measured=("psi", "theta"),
+        resolution=(QUANTUM, QUANTUM), held={"psi": 0.7}, **fields,
+    )  # fmt: skip
+    noise = {"noise.theta": LEVELS["noise.theta"], "noise.psi": 0.0, "noise.T": 0.0}
+    known = []
+    for run, plant, numbers in ((pendulum, Pendulum, alone), (locked, Furuta, alone | arm)):
+        problem = formulate(rig(plant, numbers, {}), [run])
+        values, still = {**problem.base, **noise}, np.zeros((len(run.measured), 1))
+        known.append(restart_states(problem.solver(0), problem.tracks[0], values, still, None)[..., 0])
+    np.testing.assert_allclose(known[1][2:4], known[0][:2], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(known[1][0], 0.7)
 
 
 def test_restarts_know_the_past_alone() -> None:

@@ -25,8 +25,8 @@ TEXT = Path(__file__).with_suffix(".kernel").read_text(encoding="utf-8")
 
 def kalman_gains(
     Phi: Array, Q: Array, sensors: Array, columns: Sequence[int], initial: Array, steps: int
-) -> tuple[list[Array], Array]:
-    """Gains (outputs, states, lanes) at fewer than `steps` samples, until they have settled, and the covariance then.
+) -> tuple[Array, Array]:
+    """Gains (samples, outputs, states, lanes), at most `steps`, until they have settled, and the covariance then.
 
     Parameters
     ----------
@@ -49,4 +49,4 @@ def kalman_gains(
         TEXT, "recursion", Phi, Q, sensors, np.array(columns, dtype=np.int64), P, L,
         SETTLED**2, count, room[0], room[1], np.zeros(n),
     )()  # fmt: skip
-    return list(L[: int(count[0])]), P
+    return L[: int(count[0])], P

@@ -24,6 +24,7 @@ from upright.closed_loop.structures import ClosedLoop, finer
 from upright.errors import BadInput
 from upright.identification.model.grey_box import NOISE, GreyBox, Parameter, base_values
 from upright.identification.model.runs import Run
+from upright.identification.problem.following import filter_record
 from upright.identification.problem.riccati import kalman_gains
 from upright.identification.problem.tracks import DRIFT, FilterPlan, Track, nearest_equilibrium
 from upright.laws import Law
@@ -185,46 +186,30 @@ def restart_states(
     gain = gains(solver, track, values, steps, lanes)
     table, drift = _table(solver, values, count, lanes)
     still = table[drift]
-    start = np.repeat(begin, lanes)
-    columns = list(track.columns)
-    measured = track.y.T[:, : last + 1, None] - offsets[:, None]
-    if scales is not None:
-        measured /= scales[:, None]
-
-    states = len(plan.equilibrium)
+    states, columns = len(plan.equilibrium), list(track.columns)
+    scale = np.ones_like(offsets) if scales is None else scales
     x = np.zeros((states + len(still), count, lanes))
     x[:states] = plan.equilibrium[:, None, None]
-    x[columns] = measured[:, begin]
-    stepping = solver.stepping(table, x[:states].reshape(states, -1), track.u)
+    x[columns] = (track.y.T[:, begin, None] - offsets[:, None]) / scale[:, None]
     place = np.full(last + 1, -1)
     place[track.restarts] = np.arange(track.restarts.size)
     out = np.full((len(x), track.restarts.size, lanes), np.nan)
-    with np.errstate(over="ignore", invalid="ignore"):  # a lane that diverges shows by its NaN
-        for j in range(1, steps):
-            stepping.params[drift] = still + x[states:].reshape(len(still), -1)
-            stepping.state[:] = x[:states].reshape(states, -1)
-            stepping.start[:] = start + (j - 1)
-            stepping.go()
-            x[:states] = stepping.after.reshape(states, count, lanes)
-            now = np.minimum(begin + j, last)
-            innovation = measured[:, now]
-            innovation -= x[columns]
-            for correct, missed in zip(gain[min(j, len(gain) - 1)], innovation, strict=True):
-                x += correct[:, None] * missed
-            used = (place[now] >= 0) & (begin + j <= last)
-            if j >= plan.warm and used.any():
-                out[:, place[now[used]]] = x[:, used]
+    stepping = solver.stepping(table, x[:states].reshape(states, -1), track.u)
+    filter_record(
+        stepping, x.reshape(len(x), -1), begin, still, drift, track.y, offsets, scale, gain, columns, place, out,
+        warm=plan.warm, steps=steps,
+    )  # fmt: skip
     return out
 
 
-def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int) -> list[Array]:
-    """Kalman gains (outputs, states, lanes) at the samples of a stretch, until they have settled; the first is zero."""
+def gains(solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int) -> Array:
+    """Kalman gains (samples, outputs, states, lanes) from the first of a stretch, which is zero, until they settle."""
     return filtering(solver, track, values, steps, lanes)[0]
 
 
 def filtering(
     solver: Simulator, track: Track, values: Mapping[str, float | Array], steps: int, lanes: int
-) -> tuple[list[Array], Array]:
+) -> tuple[Array, Array]:
     """As `gains`, and the covariance (lanes, S, S) of states and drifts of the inputs that they leave at the last."""
     Phi, Q = discrete_model(solver, track, values, lanes)
     plan = _plan(track)

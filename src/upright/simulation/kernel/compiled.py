@@ -73,21 +73,22 @@ class Kernel:
         self.text, self._strict = text, strict
         self.compiled: list[str] = []
         """Names of the functions that were not found in the cache."""
+        self._addresses: dict[str, int] = {}
 
     @cached_property
     def run_1(self) -> Callable[..., None]:
         """Steps one motion."""
-        return _steps(self._address("run_1"))
+        return _steps(self.address("run_1"))
 
     @cached_property
     def run_16(self) -> Callable[..., None]:
         """Steps blocks of `WIDTH` motions."""
-        return _steps(self._address("run_16"))
+        return _steps(self.address("run_16"))
 
-    @cached_property
+    @property
     def events(self) -> int:
         """Address of the search of events."""
-        return self._address("events")
+        return self.address("events")
 
     def wasm(self, name: str) -> Wasm:
         """Module of WebAssembly of ``run_1`` or ``run_16``, to be called with `lanes.RUN_ARGUMENTS` plainly."""
@@ -118,11 +119,14 @@ class Kernel:
 
         return self._code(f"ptx {room}", lambda: machine.ptx(threaded(self.text, room, machine.gpu())))
 
-    def _address(self, name: str) -> int:
+    def address(self, name: str) -> int:
+        """Where ``run_1``, ``run_16`` or ``events`` stands in memory; the former take `run_words`."""
         from upright.simulation.lowering import machine
 
-        code = self._code(name, lambda: machine.compiled(lowered(self.text, name, strict=self._strict)))
-        return machine.address_of(code, name)
+        if name not in self._addresses:
+            code = self._code(name, lambda: machine.compiled(lowered(self.text, name, strict=self._strict)))
+            self._addresses[name] = machine.address_of(code, name)
+        return self._addresses[name]
 
     def _code(self, name: str, compiled: Callable[[], bytes]) -> bytes:
         def noted() -> bytes:
@@ -139,9 +143,14 @@ def _steps(address: int) -> Callable[..., None]:
     function = machine.function(address)
 
     def run(*args: Any) -> None:
-        function(_WORDS.pack(*[id(a) if by_address else a for by_address, a in zip(_ARRAYS, args, strict=True)]))
+        function(run_words(*args))
 
     return run
+
+
+def run_words(*args: Any) -> bytes:
+    """`lanes.RUN_ARGUMENTS` as a compiled loop reads them; whoever keeps the words keeps the arrays as well."""
+    return _WORDS.pack(*[id(a) if by_address else a for by_address, a in zip(_ARRAYS, args, strict=True)])
 
 
 def lowered(text: str, name: str, *, strict: bool = False) -> str:
