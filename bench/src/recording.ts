@@ -29,6 +29,8 @@ export interface Recorded {
   why: string;
   outputs: { name: string; unit: string; meaning: string }[];
   planned?: number[];
+  /** Modes near which there is no sine [rad/s], and how long one would take to settle [s]; null where it never does. */
+  gaps?: [number, number | null][];
   line?: { omega: number[]; dB: number[][]; deg: number[][] };
   points?: Point[];
   measured?: Curve[];
@@ -52,6 +54,11 @@ export function within(value: number | null, half: number | null): string {
   if (half === null) return signed(value, 1);
   const digits = half > 0 ? Math.max(0, Math.min(4, 1 - Math.floor(Math.log10(half)))) : 3;
   return `${signed(value, digits)} ± ${signed(half, digits)}`;
+}
+
+/** Why there is no sine near some modes; "" where there is none without. */
+export function gapWords(gaps: [number, number | null][]): string {
+  return gaps.map(([omega, seconds]) => ` None is planned within 10 % of the mode at ${significant(omega, 3)} rad/s: it would ${seconds === null ? "never settle" : `take ${seconds.toFixed(0)} s to settle`}, and a weaker one is lost in dry friction.`).join("");
 }
 
 export class Recording {
@@ -98,11 +105,11 @@ export class Recording {
   }
 
   private words(): void {
-    const { kind, over, run, time, lost, why, seconds, planned, points, reading, modes } = this.recorded!, link = byId<HTMLAnchorElement>("record-file");
+    const { kind, over, run, time, lost, why, seconds, planned, gaps, points, reading, modes } = this.recorded!, link = byId<HTMLAnchorElement>("record-file");
     const done = `${time.toFixed(0)} s of ${seconds.toFixed(0)} s`, unsettled = points?.filter((point) => !point.settled).length ?? 0;
     const measured = `${points?.length ?? 0} of ${planned?.length ?? 0} sines measured`;
     const late = unsettled ? ` ${unsettled === 1 ? "One has" : `${unsettled} have`} not settled, and count for less.` : "";
-    say(byId("record-says"), (kind === "sweep" ? `${measured}, ${done}.` : `${done}.`) + (over && kind === "sweep" ? late : "") + (over && run ? " It is kept as a run, and can be identified." : "") + (why ? ` ${why}` : ""));
+    say(byId("record-says"), (kind === "sweep" ? `${measured}, ${done}.${gapWords(gaps ?? [])}` : `${done}.`) + (over && kind === "sweep" ? late : "") + (over && run ? " It is kept as a run, and can be identified." : "") + (why ? ` ${why}` : ""));
     link.hidden = !over || !run || !!why || !points?.length;
     link.href = `${this.runs}/${run}.frequency.csv`;
     byId("record-points").replaceChildren(...(points ?? []).map((point) => make("tr", {}, make("th", { scope: "row" }, significant(point.omega, 3)),

@@ -69,6 +69,11 @@ def test_of_a_sweep_each_point_is_the_line_of_a_fourier_transform_and_what_was_l
     drawn, y, u = played(rig, SWEEP, tmp_path, monkeypatch, lost=[before, 70_000])
     assert (drawn["over"], drawn["run"], drawn["kind"]) == (True, "run", "sweep")
     assert len(drawn["points"]) == len(drawn["planned"]) - 2
+    (swing,) = (abs(p) for p in rig.model.linear("hanging").poles() if p.imag > 0)
+    ((gap, seconds),) = drawn["gaps"]
+    assert gap == pytest.approx(swing, rel=1e-4)
+    assert min(abs(w / swing - 1) for w in drawn["planned"]) > 0.1
+    assert seconds > 60
     missed = set(drawn["planned"]) - {p["omega"] for p in drawn["points"]}
     windows = dict(zip(plan.omega.tolist(), plan.windows, strict=True))
     for point in drawn["points"]:

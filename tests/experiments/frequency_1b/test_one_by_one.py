@@ -6,9 +6,18 @@ import math
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from upright.errors import BadInput
-from upright.experiments.frequency_1b.one_by_one import modelled, response_of_sines, sine, stepped_sines
+from upright.experiments.frequency_1b.one_by_one import (
+    LEFT,
+    SLOWEST,
+    modelled,
+    response_of_sines,
+    settling,
+    sine,
+    stepped_sines,
+)
 from upright.experiments.stand.twin import TwinStand
 from upright.rig.makes import MAKES, make_rig
 
@@ -74,9 +83,38 @@ def test_a_rig_that_would_fall_is_not_swept():
         stepped_sines(stand)
 
 
-def test_near_a_mode_no_sine_is_asked_for_as_none_would_settle():
-    for make in sorted(MAKES):
-        stand = TwinStand(rig=make_rig(make), make=MAKES[make])
-        modes = [abs(p) for p in stand.rig.linear(stand.resting).poles() if p.imag > 0]
-        ratio = np.abs(np.log(stepped_sines(stand).omega[:, None] / modes))
-        assert ratio.min() > math.log(1.1)
+def test_near_a_mode_a_sine_is_measured_where_its_free_swing_decays_in_time_as_harmonic_balance_has_it(tmp_path):
+    rig = make_rig("torsional", 3)
+    plan, _, sines = swept(TwinStand(rig=rig, make=MAKES["torsional"]), tmp_path)
+    p, response = rig.plant.parameters(), response_of_sines(sines, rig).response
+    (mode,) = (abs(z) for z in rig.linear("rest").poles() if z.imag > 1.0)
+    near = [k for k, w in enumerate(plan.omega) if abs(w / mode - 1) < 0.1]
+    assert (plan.omega[near] / mode) == pytest.approx([0.95, 1.0, 1.05], abs=0.003)
+    for k in near:
+        speeds = plan.omega[k] * np.abs(sines[k].tone.lines[0])
+        damped = {f"c_{i}": p[f"c_{i}"] + 4 * p[f"f_{i}c"] / (math.pi * v) for i, v in zip((1, 2), speeds, strict=True)}
+        expected = two_disks({**p, **damped}, rig.gain, plan.omega[k]) * drive(rig, plan.omega[k])
+        assert np.abs(response[k] / expected - 1).max() < 0.01  # 7 % from the same without dry friction
+    assert plan.gaps == ()
+
+
+@pytest.mark.parametrize(("omega", "zeta"), [(8.0, 0.018), (27.0, 0.028), (27.0, 0.1)])
+def test_a_mode_settles_when_a_simulation_of_it_does(omega, zeta):
+    wait = settling(omega * complex(-zeta, math.sqrt(1 - zeta**2)))
+    t = np.linspace(0.0, SLOWEST[0] + wait + math.pi / omega, 20_001)  # half a period more
+    grown = (1 - np.cos(np.pi * np.minimum(t / SLOWEST[0], 1.0))) / 2
+    mode = signal.lti([2 * zeta * omega**2], [1.0, 2 * zeta * omega, omega**2])  # -1j at its own frequency
+    _, y, _ = signal.lsim(mode, grown * np.sin(omega * t), t)
+    last = t > t[-1] - 2 * math.pi / omega
+    assert 1 - np.ptp(y[last]) / 2 == pytest.approx(LEFT, abs=0.004)
+
+
+@pytest.mark.parametrize("make", sorted(MAKES))
+def test_what_would_not_settle_in_time_is_left_out_and_named(make):
+    stand = TwinStand(rig=make_rig(make), make=MAKES[make])
+    poles = [p for p in stand.rig.linear(stand.resting).poles() if p.imag > 0]
+    plan = stepped_sines(stand)
+    for pole in poles:
+        near = np.abs(np.log(plan.omega / abs(pole))) < math.log(1.1)
+        slow = -1 / pole.real > 5.0  # seconds
+        assert (near.sum(), abs(pole) in dict(plan.gaps)) == ((0, True) if slow else (3, False))

@@ -114,7 +114,8 @@ class Recording:
         if not self._line:
             return facts
         if isinstance(plan, SteppedSines):
-            return {**facts, "planned": plan.omega.tolist(), "points": self._points(sines)}
+            gaps = [five_digits(np.array(gap)) for gap in plan.gaps]
+            return {**facts, "planned": plan.omega.tolist(), "gaps": gaps, "points": self._points(sines)}
         t = np.arange(came, dtype=np.float64) * plan.period
         read = None if decayed is None else {
             "omega": decayed.omega_n, "omega_error": NORMAL * decayed.omega_error, "zeta": decayed.zeta,

@@ -3,11 +3,16 @@
 A rig that runs cannot wait for what it has shown, as `sweeps` does, so that every sine grows and dies away slowly:
 about a lightly damped mode over some beats with it, else the free swing that it starts would be measured with it. What
 is left of that shows in the scatter from period to period, and a point that had not settled is known by it.
+
+Within a tenth of a mode beats do not help: there a sine waits until the free swing has decayed, where the model says
+that it does in time. Smaller amplitudes do not help either, since the free swing shrinks with them and dry friction
+weighs more: a driven body below a lightly damped pendulum stands still at what such a sine may move.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +40,11 @@ RISE, SLOWEST, BEATS = 3, (3.0, 6.0), 1.5
 SETTLED = 0.05
 """Standard error of each reading's line from period to period, beside it, up to which a sine counts as settled."""
 CLEAR = 0.1
-"""Logarithm of the ratio of a frequency to a lightly damped mode, below which it is left out: it would not settle."""
+"""Logarithm of the ratio of a frequency to a mode, below which a sine cannot rely on beats with it."""
+BESIDE = (0.95, 1.0, 1.05)
+"""Frequencies beside that of a mode at which sines wait until they have settled."""
+LEFT, LONGEST = 0.01, 10.0
+"""Share of free swing in such a sine that may be left when it is measured, and longest time to wait for that [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,6 +61,8 @@ class SteppedSines:
         Samples of each that are measured: the first, and that after the last.
     samples : (N,) array
         Of the command [command unit], one each `period` [s].
+    gaps : tuple of (float, float)
+        Modes within the band near which there is no sine [rad/s], and how long one would take to settle [s].
     """
 
     omega: Array
@@ -59,6 +70,7 @@ class SteppedSines:
     windows: tuple[tuple[int, int], ...]
     samples: Array
     period: float
+    gaps: tuple[tuple[float, float], ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -87,28 +99,63 @@ def stepped_sines(stand: TestStand, count: int = COUNT) -> SteppedSines:
     if max(p.real for p in linear.poles()) > 0.1:
         raise BadInput(f"{rig.name} falls where its encoders are zeroed; a sweep needs a rig that hangs or stands.")
     band, reach = band_and_reach(stand)
-    lengths = grid(*band, count, rig.period)
+    waits = {abs(p): settling(p) for p in swinging(linear.poles().tolist()) if p.imag > 0}
+    lengths = _lengths(band, count, rig.period, waits)
     omega: Array = 2 * math.pi / (lengths * rig.period).astype(np.float64)
-    modes = np.abs(swinging(linear.poles().tolist()))
-    clear = np.all(np.abs(np.log(omega[:, None] / modes)) > CLEAR, axis=1)
-    lengths, omega = lengths[clear], omega[clear]
+    near = [_near(w, waits) for w in omega.tolist()]
     moved = np.abs(linear.response(omega)[:, :, 0])
+    # a mode is known to some percent, and its sines move a rig whose own mode lies there no further
+    peaks = np.max([np.abs(linear.response(omega * share)[:, :, 0]) for share in BESIDE], axis=0)
+    moved = np.where(np.array([bool(modes) for modes in near])[:, None], peaks, moved)
     if stand.make is not None:
         reach = np.minimum(reach, np.array(stand.make.fastest) / omega[:, None])
     level = np.minimum(SHARE * rig.limit, np.min(reach / moved, axis=1))
     parts, windows = [np.zeros(math.ceil(STILL / rig.period))], list[tuple[int, int]]()
-    for w, length, most in zip(omega.tolist(), lengths.tolist(), level.tolist(), strict=True):
-        beat = 2 * math.pi / float(np.min(np.abs(modes - w), initial=math.inf))
-        wanted = min(max(BEATS * beat, SLOWEST[0]), SLOWEST[1])
-        ramp = math.ceil(max(RISE, wanted / (length * rig.period))) * length
-        whole = max(PERIODS, math.ceil(LEAST / (length * rig.period))) * length
-        k = np.arange(2 * ramp + whole)
+    for w, length, most, modes in zip(omega.tolist(), lengths.tolist(), level.tolist(), near, strict=True):
+        cycle, wait = length * rig.period, max((waits[mode] for mode in modes), default=0.0)
+        beat = 2 * math.pi / min((abs(mode - w) for mode in waits), default=math.inf)
+        wanted = SLOWEST[0] if modes else min(max(BEATS * beat, SLOWEST[0]), SLOWEST[1])
+        ramp, hold = math.ceil(max(RISE, wanted / cycle)) * length, math.ceil(wait / cycle) * length
+        whole = max(PERIODS, math.ceil(LEAST / cycle)) * length
+        k = np.arange(2 * ramp + hold + whole)
         size = (1 - np.cos(math.pi * np.clip(np.minimum(k, k[::-1] + 1) / ramp, 0.0, 1.0))) / 2
-        first = sum(part.size for part in parts) + ramp
+        first = sum(part.size for part in parts) + ramp + hold
         windows.append((first, first + whole))
-        parts.append(most * size * np.sin(2 * math.pi * k / length))
+        rest = np.zeros(math.ceil(max(0.0, wait - SLOWEST[0]) / rig.period))  # the next sine's growth is a rest, too
+        parts += [most * size * np.sin(2 * math.pi * k / length), rest]
     samples = np.concatenate([*parts, np.zeros(math.ceil(STILL / rig.period))])
-    return SteppedSines(omega=omega, lengths=lengths, windows=tuple(windows), samples=samples, period=rig.period)
+    gaps = tuple((m, wait) for m, wait in waits.items() if band[0] <= m <= band[1] and wait > LONGEST)
+    return SteppedSines(
+        omega=omega, lengths=lengths, windows=tuple(windows), samples=samples, period=rig.period, gaps=gaps
+    )
+
+
+def settling(mode: complex) -> float:
+    """How long a sine at a mode goes on, once it has grown, until `LEFT` of it is free swing [s].
+
+    The amplitude a that a command of envelope e keeps up there obeys a' = s (e - a), with the decay s of the free
+    swing; when e = (1 - cos(pi t / T)) / 2 has grown, (1 + exp(-s T)) / 2 / (1 + (s T / pi)^2) of it is still missing.
+    """
+    s = -mode.real
+    if s <= 0:
+        return math.inf
+    missing = (1 + math.exp(-s * SLOWEST[0])) / 2 / (1 + (s * SLOWEST[0] / math.pi) ** 2)
+    return max(0.0, math.log(missing / LEFT) / s)
+
+
+def _near(omega: float, modes: Iterable[float]) -> list[float]:
+    return [mode for mode in modes if abs(math.log(omega / mode)) <= CLEAR]
+
+
+def _lengths(
+    band: tuple[float, float], count: int, period: float, waits: Mapping[float, float]
+) -> NDArray[np.int64]:  # fmt: skip
+    """Samples in a period of each sine: of a grid clear of the modes, and beside those where one settles in time."""
+    clear = [n for n in grid(*band, count, period).tolist() if not _near(2 * math.pi / (n * period), waits)]
+    modes = [mode for mode in waits if band[0] <= mode <= band[1]]
+    beside = [round(2 * math.pi / (mode * share * period)) for mode in modes for share in BESIDE]
+    beside = [n for n in beside if max(waits[m] for m in _near(2 * math.pi / (n * period), waits)) <= LONGEST]
+    return np.unique([*clear, *beside])[::-1]
 
 
 def sine(plan: SteppedSines, k: int, rig: Rig, y: Array, u: Array) -> Sine:
