@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,7 +18,7 @@ from upright.physics.plant import Plant
 from upright.progress import Progress, silent
 from upright.simulation.kernel.flavour import choose
 from upright.simulation.simulator import Device, Held, Simulator
-from upright.workers import Workers, cut, spread
+from upright.workers import Workers, cores, cut, spread
 
 Array = NDArray[np.float64]
 
@@ -152,8 +151,8 @@ def ensemble(
     job = _prepare(plant, params, x0, u, dt, substeps, start, loop, held or {}, record=False)
     lanes = job.x0.shape[1]
     if workers is None:
-        own = threads or (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
-        rows = _reduced(job, samples, settle, (slice(0, lanes), job.table, job.x0, job.start), silent, own, device)
+        own = (slice(0, lanes), job.table, job.x0, job.start)
+        rows = _reduced(job, samples, settle, own, silent, threads or cores(), device)
     else:
         parts = [
             (p, job.table[:, p], job.x0[:, p], None if job.start is None else job.start[p])

@@ -16,6 +16,7 @@ from upright.errors import BadInput
 from upright.progress import silent
 from upright.workers.carriage import carried, unpacked
 from upright.workers.linear_algebra import limit_threads
+from upright.workers.threads import one_core
 
 IDLE = 60
 """Seconds after which processes without work end."""
@@ -28,7 +29,7 @@ _TURN = Lock()
 
 def do(order: bytes, item: bytes) -> bytes:
     """Do a task for an item, over there; one at a time in a process."""
-    with _TURN:
+    with _TURN, one_core():
         _one_thread()
         return carried(_task(order)(unpacked(item), silent))
 

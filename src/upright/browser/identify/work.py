@@ -35,6 +35,7 @@ from upright.study.draft.from_record import study_of_record
 from upright.study.load import Study
 from upright.study.results import fit_content, write_fit
 from upright.study.windows import windows
+from upright.workers import one_core
 
 BUCKETS, FEW = 300, 150
 """Of a curve in the page, and while a fit goes on; a bucket has its least and its greatest sample."""
@@ -66,7 +67,8 @@ def identify_log(
     study = _tested(study)
     if not study.model.estimated:
         raise BadInput(f"every number of {study.title} is known, so that nothing is left to estimate.")
-    fit = identify(study.model, study.runs, progress=progress, show=None if show is None else _shower(study, show))
+    with one_core():  # the other ones are for loops that must not be late
+        fit = identify(study.model, study.runs, progress=progress, show=None if show is None else _shower(study, show))
     finish()
     folder.mkdir(parents=True)
     write_fit(fit, study, folder / "fit.json")

@@ -8,7 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import partial
+from threading import get_ident
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +42,10 @@ from upright.identification.problem.unknowns import (
 )
 from upright.signals.memory import memory
 from upright.simulation import Simulator
+from upright.workers import share
 
 Array = NDArray[np.float64]
+Products = tuple[Array, Array, float]
 
 
 ROUNDING = 12**-0.5
@@ -53,6 +59,9 @@ NOTICED = 0.2
 
 LEAST_MISSED = 0.01
 """What is missed of a component counts as no less than this share of what is missed of the worst."""
+
+SHARED = 1000
+"""Samples of a run, in the mean, from which on threads share the runs: they take a third of a millisecond."""
 
 STEP = 1e-5
 """A perturbed number moves the weighted outputs by about this much, root mean square."""
@@ -72,7 +81,7 @@ class Problem:
     noise: float = 0.1
     evaluations: int = 0
     _solvers: dict[int, Simulator] = field(init=False, default_factory=dict[int, Simulator])
-    _memory: Array = field(init=False, default_factory=lambda: np.empty(0))
+    _memory: dict[int, Array] = field(init=False, default_factory=dict[int, Array])  # one for each thread
 
     def __post_init__(self) -> None:
         self.base, self._friction = base_values(self.rig), friction_names(self.rig)
@@ -300,37 +309,53 @@ class Problem:
 
     def normal(self, x: Array, horizon: float = math.inf) -> Normal:
         """Cost and its Gauss-Newton model at coordinates `x`; the cost is infinite when a simulation ran away."""
-        size = x.size
+        size, places = x.size, range(len(self.tracks))
         A, g, cost = np.zeros((size, size)), np.zeros(size), 0.0
-        for index in range(len(self.tracks)):
-            sought = self.sought_in(index)
-            if self.tracks[index].windowed:
-                rows = self.rows(index, x, horizon)
-                if rows is None:
+        for index in places:  # made here: threads would each make one
+            self.solver(index)
+        squares = partial(self._counted_squares, x, horizon)
+        with closing(share(squares, places) if self._long(horizon) else (squares(index) for index in places)) as each:
+            for index, (products, evaluations) in enumerate(each):
+                self.evaluations += evaluations
+                if products is None or not math.isfinite(products[2]):
                     return Normal.lost(size)
-                squares = products(rows[1].reshape(-1, sought.size), rows[0].reshape(-1))
-            else:
-                squares = self._squares(index, x, horizon, sought)
-            if not math.isfinite(squares[2]):
-                return Normal.lost(size)
-            cost += squares[2]
-            with np.errstate(over="ignore", invalid="ignore"):  # a number far from where it is felt
-                A[np.ix_(sought, sought)] += squares[0]
-                g[sought] += squares[1]
+                sought = self.sought_in(index)
+                cost += products[2]
+                with np.errstate(over="ignore", invalid="ignore"):  # a number far from where it is felt
+                    A[np.ix_(sought, sought)] += products[0]
+                    g[sought] += products[1]
         r, J = self.prior_rows(x)
         cost += float(r @ r)
         normal = Normal(cost, A + J.T @ J, g + J.T @ r)
         return normal if finite(normal.matrix) else Normal.lost(size)
 
-    def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> tuple[Array, Array, float]:
+    def _long(self, horizon: float) -> bool:
+        """Whether the runs are long enough for threads to share them."""
+        samples = sum(t.y.shape[0] if t.windowed else t.within(horizon) for t in self.tracks)
+        return len(self.tracks) > 1 and samples > SHARED * len(self.tracks)
+
+    def _counted_squares(self, x: Array, horizon: float, index: int) -> tuple[Products | None, int]:
+        """``J'J``, ``J'r`` and ``r'r`` of one run, None where it runs away; and the simulations that it took.
+
+        Who counts them adds them up in the order of the runs, so that they do not depend on who computed what.
+        """
+        own, sought = copy(self), self.sought_in(index)
+        own.evaluations = 0
+        if not self.tracks[index].windowed:
+            return own._squares(index, x, horizon, sought), own.evaluations
+        rows = own.rows(index, x, horizon)
+        return rows and products(rows[1].reshape(-1, sought.size), rows[0].reshape(-1)), own.evaluations
+
+    def _squares(self, index: int, x: Array, horizon: float, sought: NDArray[np.int64]) -> Products:
         """``J'J``, ``J'r`` and ``r'r`` of a free run, in the lanes as they come: the same numbers as from `rows`."""
         track, n = self.tracks[index], self.tracks[index].within(horizon)
         d = self._setting(index, self.lanes(x, sought))
         self.evaluations += 1
         rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
-        if self._memory.size < (most := n * rows * (sought.size + 16)):
-            self._memory = np.empty(most)
-        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory)
+        thread, most = get_ident(), n * rows * (sought.size + 16)
+        if thread not in self._memory or self._memory[thread].size < most:
+            self._memory[thread] = np.empty(most)
+        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory[thread])
         skip = min(track.first, n - 1)
         counts = slice(skip, n) if track.retained is None else np.flatnonzero(track.retained[:n])
         observed = [motion[counts, c] for c in track.columns]

@@ -6,6 +6,7 @@ import ctypes
 import sys
 from collections.abc import Callable
 from functools import cache
+from threading import Lock
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -26,6 +27,9 @@ Elsewhere each section may lie anywhere, and every constant needs an instruction
 
 _loaded: list[Any] = []
 """Whoever loaded code owns it, and stays."""
+
+_loading = Lock()
+"""One linker serves all threads, and calls what it loads by their number."""
 
 
 @cache
@@ -163,6 +167,11 @@ def _linker() -> Any:
 
 def address_of(code: bytes, name: str) -> int:
     """Address of a function in object code, brought into memory."""
+    with _loading:
+        return _brought(code, name)
+
+
+def _brought(code: bytes, name: str) -> int:
     if _LINKS:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
         _loaded.append(library.link(_linker(), f"kernel {len(_loaded)}"))
