@@ -29,7 +29,8 @@ from upright.experiments.frequency_1b.sweeps import (
 )
 from upright.experiments.stand.known import Known, bench_values
 from upright.identification.frequency.answer import key_value
-from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
+from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of
+from upright.identification.frequency.stepped import sines_in
 from upright.identification.model.fit import Estimate, Pole
 from upright.readers import read
 from upright.records import Record

@@ -11,7 +11,8 @@ import scipy.signal
 from upright.errors import BadInput, NotIdentifiable
 from upright.identification.frequency.detection import by_period, detect, overtones, sign_line
 from upright.identification.frequency.response import FrequencyResponse, describing
-from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of, sines_in
+from upright.identification.frequency.spectra import chirp, multisine, odd_lines, repetition, response_of
+from upright.identification.frequency.stepped import sines_in
 from upright.records import Provenance, Record
 
 DT = 1e-3

@@ -25,7 +25,7 @@ from upright.experiments.stand.stand import TestStand
 from upright.experiments.stand.strength import SHARE, STILL, swinging
 from upright.identification.frequency.detection import Tone, detect
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.frequency.spectra import from_tones
+from upright.identification.frequency.stepped import from_tones
 from upright.records import Array
 from upright.rig import Rig
 

@@ -20,7 +20,8 @@ from upright.errors import BadInput
 from upright.experiments.stand.strength import SHARE
 from upright.identification.frequency.detection import Tone, by_period, detect, settled
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.frequency.spectra import chirp, from_tones, multisine, odd_lines, response_of
+from upright.identification.frequency.spectra import chirp, multisine, odd_lines, response_of
+from upright.identification.frequency.stepped import from_tones
 from upright.records import Array, Record
 from upright.rig import Rig
 from upright.rig.makes import Make, make_rig

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 HARMONICS = 31
+PER_PERIOD = 4
+"""Samples per period that a sine needs at least."""
 EDGES = 4096
 """Instants per period at which a speed's sign is looked at."""
 REACH = 0.11
@@ -113,7 +115,7 @@ def detect(t: Array, y: Array, omega: float, *, resolution: Array | float = 0.0,
     span = float(t[-1] - t[0]) * t.size / (t.size - 1)
     periods = span * omega / (2 * math.pi)
     per_period = t.size / periods
-    if periods < 0.9 or per_period < 4:
+    if periods < 0.9 or per_period < PER_PERIOD:
         raise BadInput(
             f"A sine of {omega:.4g} rad/s needs at least one period with four samples, got {periods:.3g} periods of "
             f"{per_period:.3g} samples; log faster or longer."

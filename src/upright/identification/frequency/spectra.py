@@ -11,21 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from upright.errors import BadInput, NotIdentifiable
-from upright.identification.frequency.detection import Tone, detect, overtones, settled
+from upright.identification.frequency.detection import settled
 from upright.identification.frequency.response import FrequencyResponse, describing
+from upright.identification.frequency.stepped import covered, stepped_response
 from upright.records import Record
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-SAME = 0.02
-"""Relative difference of successive periods of one sine."""
 WEAK = 0.03
 """Share of the command's largest amplitude spectrum below which a frequency was not excited."""
 DRAWS = 200
@@ -67,10 +65,8 @@ def response_of(
     u = records[0][command]
     if not np.ptp(u) > 0:
         raise NotIdentifiable(f"The command '{command}' never changes, so nothing was excited; name its column.")
-    pieces = [piece for r in records for piece in sines_in(r.t, r[command])] if kind in (None, "sines") else []
-    covered = sum(b - a for a, b, _ in pieces) / sum(len(r) for r in records)
-    if kind == "sines" or (not kind and covered > 0.5):
-        response = _sines(records, command, outputs, quanta, hold)
+    if kind == "sines" or (not kind and np.mean([covered(r.t, r[command]) for r in records]) > 0.5):
+        response = stepped_response(records, command, outputs, quanta, hold)
     elif kind == "multisine" or (not kind and all(repetition(r[command]) is not None for r in records)):
         response = multisine_response(records, command, outputs, quanta, hold)
     else:
@@ -84,85 +80,6 @@ def response_of(
             )
         response = response.only(inside)
     return response
-
-
-def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
-    """Stretches (first, last, omega) of a command that are one sine each, three periods or more."""
-    v = u - (u.max() + u.min()) / 2
-    at = np.flatnonzero((v[:-1] < 0) & (v[1:] >= 0)) + 1
-    if at.size < 3:
-        return []
-    lows, highs = np.minimum.reduceat(v, at), np.maximum.reduceat(v, at)
-    whole = np.concatenate([[True], -lows[:-1] > 0.3 * highs[:-1]])  # a ripple about zero is no period
-    share = v[at - 1] / (v[at - 1] - v[at])
-    up = list(zip(at[whole].tolist(), (t[at - 1] + share * (t[at] - t[at - 1]))[whole].tolist(), strict=True))
-    out: list[tuple[int, int, float]] = []
-    i = 0
-    while i < len(up) - 1:
-        j = i + 1
-        first = up[j][1] - up[i][1]
-        while j + 1 < len(up) and abs(up[j + 1][1] - up[j][1] - first) < SAME * first + 0.5 * (t[1] - t[0]):
-            j += 1
-        if j - i >= 2:
-            omega = 2 * math.pi * (j - i) / (up[j][1] - up[i][1])
-            out.append((up[i][0], up[j][0], omega))
-        i = j
-    return out
-
-
-def _sines(
-    records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
-) -> FrequencyResponse:
-    tones: list[tuple[float, Tone, Tone]] = []
-    notes: list[str] = []
-    for r in records:
-        y = np.column_stack([r[n] for n in outputs])
-        for a, b, omega in sines_in(r.t, r[command]):
-            period = 2 * math.pi / omega
-            lines = []
-            edges = np.searchsorted(r.t, r.t[a] + period * np.arange(math.floor((r.t[b - 1] - r.t[a]) / period) + 1.01))
-            for lo, hi in pairwise(edges.tolist()):
-                lines.append(detect(r.t[lo:hi], y[lo:hi], omega, blocks=1).lines[0])
-            begin = settled(np.array(lines), window=4) if len(lines) > 4 else 0
-            if begin is None:
-                notes.append(f"Not settled at {omega:.3g} rad/s.")
-                begin = len(lines) // 2
-            first = edges[min(begin, max(0, len(edges) - 3))]
-            part = slice(int(first), int(edges[-1]))
-            tones.append((
-                omega, detect(r.t[part], y[part], omega, resolution=quanta), detect(r.t[part], r[command][part], omega),
-            ))  # fmt: skip
-    if not tones:
-        raise NotIdentifiable("The command holds no sine of three periods; try --kind sweep.")
-    tones.sort(key=lambda f: f[0])
-    distinct = [tones[0]]
-    for f in tones[1:]:
-        if f[0] > distinct[-1][0] * (1 + 1e-4):
-            distinct.append(f)
-        elif float(f[1].variance.sum()) < float(distinct[-1][1].variance.sum()):
-            distinct[-1] = f
-    return from_tones(
-        [x for _, x, _ in distinct], [c for _, _, c in distinct], outputs=outputs,
-        units=_units(records[0], outputs, command), command=command, hold=hold, notes=notes,
-    )  # fmt: skip
-
-
-def from_tones(
-    tones: Sequence[Tone], commands: Sequence[Tone], *, outputs: Sequence[str], units: Sequence[str],
-    command: str = "u", hold: float, notes: Sequence[str] = (),
-) -> FrequencyResponse:  # fmt: skip
-    """Response of sines measured one after the other, each detected in the outputs and in the command."""
-    drive = np.array([c.lines[0, 0] for c in commands])
-    return FrequencyResponse(
-        omega=np.array([x.omega for x in tones]),
-        response=np.asarray([x.lines[0] for x in tones], dtype=np.complex128) / drive[:, None],
-        outputs=tuple(outputs), units=tuple(units), input=command,
-        variance=np.array([x.variance for x in tones]) / np.abs(drive[:, None]) ** 2,
-        coherence=np.array([x.coherence for x in tones]),
-        distortion=np.array([x.distortion for x in tones]), drive=drive,
-        dry=np.array([x.dry for x in tones]), still=np.array([x.still for x in tones]),
-        overtones=overtones(tones), hold=hold, notes=tuple(notes),
-    )  # fmt: skip
 
 
 def _units(record: Record, outputs: Sequence[str], command: str) -> tuple[str, ...]:
