@@ -159,9 +159,25 @@ def responses(folder: Path) -> None:
         (folder / f"{name}.txt").write_text(text.replace("$\\theta$", "enc"), encoding="utf-8")
     study = block("howto/frequency.md", '[rig]\nplant = "torsional-1"')
     (folder / "my-study.toml").write_text(study, encoding="utf-8")
+
+    def disk(hertz: np.ndarray) -> np.ndarray:
+        s = 2j * np.pi * hertz
+        return 0.2 / (0.0025 * s**2 + 0.02 * s + 1.2)
+
+    # settled sines of six seconds each
+    f = np.repeat(np.geomspace(0.5, 15, 12), 1200)
+    t = np.tile(5e-3 * np.arange(1200), 12)
+    turn = np.exp(2j * np.pi * f * t)
+    np.savetxt(
+        folder / "sines.csv",
+        np.column_stack([5.0 * np.arange(t.size), turn.imag, np.degrees((turn * disk(f)).imag)]),
+        delimiter=";",
+        header="Time [ms];Motor [V];Angle [deg]",
+        comments="",
+        fmt="%.7g",
+    )
     f = np.geomspace(0.3, 30, 40)
-    s = 2j * np.pi * f
-    answer = 0.2 / (0.0025 * s**2 + 0.02 * s + 1.2)
+    answer = disk(f)
     table = np.column_stack([f, 20 * np.log10(abs(answer)), np.degrees(np.angle(answer))])
     np.savetxt(
         folder / "analyser.csv",

@@ -47,6 +47,16 @@ def test_magnitude_phase_and_coherence_stand_with_their_95_percent_bars():
         assert [p.unit for p in chart.panels] == [f"dB re 1 {('m', 'rad')[j]}/V", "deg", ""]
 
 
+def test_a_bar_is_half_a_turn_long_at_most_however_little_is_known():
+    data = FrequencyResponse(
+        omega=OMEGA, response=RESPONSE, outputs=("x", "theta"), variance=1e30 * np.ones((5, 2)),
+        coherence=0.1 * np.ones((5, 2)),
+    )  # fmt: skip
+    for chart in bode_charts(data, None):
+        low, high = chart.panels[1].lines[0].bars
+        np.testing.assert_allclose(high - low, 360.0)
+
+
 def test_a_model_is_drawn_within_half_a_turn_of_the_points_it_explains():
     w = np.geomspace(1, 20, 200)
     model = 8.0 / (1j * w + 4.0)

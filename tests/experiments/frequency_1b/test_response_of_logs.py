@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from upright.errors import BadInput, NotIdentifiable
+from upright.experiments.frequency_1b.chapter import log_chapter
 from upright.experiments.frequency_1b.run import LogRequest, _step, response_of_logs
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Record
@@ -73,6 +74,27 @@ def test_columns_are_taken_as_they_are_named(tmp_path):
     found = asked(path, tmp_path / "out", command="volts", signals={"theta": "alpha"})
     assert found.outputs == ("theta",)
     np.testing.assert_allclose(found.response[:, 0], closed(OMEGA), rtol=1e-3)
+
+
+def test_a_column_is_named_without_the_unit_in_its_brackets(tmp_path):
+    """A spreadsheet of sines one after the other, in degrees and milliseconds; a second encoder was not connected."""
+    omega = np.array([2.0, 5.0, 11.0])
+    t = np.concatenate([np.arange(0, 40, 5e-3) + 40 * k for k in range(3)])
+    w = np.repeat(omega, t.size // 3)
+    turn = np.exp(1j * w * (t % 40))
+    table = np.column_stack([1e3 * t, turn.imag, np.degrees((turn * closed(w)).imag), 0 * t])
+    head = "Zeit [ms];Motor [V];Winkel [deg];enc2 [deg]"
+    np.savetxt(tmp_path / "log.csv", table, delimiter=";", header=head, comments="", fmt="%.9g")
+    found = response_of_logs(
+        [tmp_path / "log.csv"], request(command="Motor", signals={"theta": "Winkel"}, kind=None), tmp_path / "out"
+    ).response
+    assert (found.outputs, found.units, found.input) == (("theta",), ("rad", "V"), "Motor [V]")
+    np.testing.assert_allclose(found.omega, omega, rtol=1e-6)
+    np.testing.assert_allclose(found.response[:, 0], closed(omega), rtol=1e-3)
+    whole = response_of_logs([tmp_path / "log.csv"], request(command="Motor", kind=None), tmp_path / "out")
+    verdict = log_chapter(whole).verdict
+    assert "3 of 3 frequencies" in verdict
+    assert "enc2 [deg] follows the command at no frequency" in verdict
 
 
 def test_a_log_that_does_not_say_what_drives_is_asked_for_it(tmp_path):

@@ -56,7 +56,8 @@ def _page(
     **values: Any,
 ) -> Chapter:  # fmt: skip
     """A response, with both fits where there are such."""
-    poor = data.coherence.min(axis=1) < 0.5
+    still = np.all(data.coherence < 0.5, axis=0)  # outputs that follow the command nowhere
+    poor = data.coherence[:, still.all() | ~still].min(axis=1) < 0.5
     charts = bode_charts(data, answer, fine=() if answer is None else curves(answer))
     more: dict[str, Any] = {} if answer is None else {
         "estimate": key_value(answer.key), "digits": digits,
@@ -65,7 +66,8 @@ def _page(
     }  # fmt: skip
     page = chapter_of(
         __name__, data=data, answer=answer, folder=folder, poor=int(poor.sum()),
-        error=0.0 if poor.all() else float(np.median(data.error[~poor])), **values, **more,
+        deaf=[] if still.all() else [n for n, deaf in zip(data.outputs, still, strict=True) if deaf],
+        error=0.0 if poor.all() else float(np.median(data.error[~poor][:, ~still])), **values, **more,
         figures={"quality": quality_chart(data), **{f"bode{j or ''}": chart for j, chart in enumerate(charts)}},
         placed={
             "notes": data.notes,

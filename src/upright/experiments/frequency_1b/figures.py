@@ -28,7 +28,8 @@ def _bode(data: FrequencyResponse, answer: FrequencyFit | None, fine: Sequence[t
     used = np.isin(data.omega, answer.used.omega) if answer is not None else np.ones(len(data), dtype=bool)
     turn = np.degrees(np.unwrap(np.angle(data.response[:, j])))
     turn -= 360 * np.round(np.median(turn + 90) / 360)
-    decibel, error = data.magnitude_dB[:, j], data.error[:, j]
+    # a bar of half a turn says that the phase is unknown; a longer one would hide all else
+    decibel, error = data.magnitude_dB[:, j], np.minimum(data.error[:, j], np.pi / 1.96)
     magnitude = _measured(data.omega, decibel, 1.96 * 20 / np.log(10) * error, used)
     phase = _measured(data.omega, turn, 1.96 * np.degrees(error), used)
     fits = (("least squares", "q0", "", "o"), ("simplex on dB", "q1", "7 4", "s"))

@@ -7,6 +7,7 @@ file, for a rig of one's own.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -302,10 +303,14 @@ def _logs(sources: Sequence[Path], request: LogRequest) -> FrequencyResponse:
 
     records = [read(path) for path in sources]
     first = records[0]
-    command = request.command or (first.inputs[0] if len(first.inputs) == 1 else "")
+    command = _column(first, request.command or (first.inputs[0] if len(first.inputs) == 1 else ""))
     if not command:
-        raise BadInput(f"The log holds the columns {', '.join(first.names)}; say which one drives with --command.")
-    signals = dict(request.signals) or {n: n for n in first.outputs or [n for n in first.names if n != command]}
+        raise BadInput(
+            f"A response needs the column that drives; the log holds the columns {', '.join(first.names)}; say which "
+            "one drives with --command."
+        )
+    signals = {n: _column(first, c) for n, c in request.signals.items()}
+    signals = signals or {n: n for n in first.outputs or [n for n in first.names if n != command]}
     for name in request.counts:
         if name not in signals:
             raise BadInput(f"--counts names '{name}', which is no output; {nearest(name, signals)}")
@@ -313,6 +318,12 @@ def _logs(sources: Sequence[Path], request: LogRequest) -> FrequencyResponse:
     resolution = [_step(scaled[0][n]) for n in signals]
     return response_of(scaled, command=command, outputs=list(signals), kind=request.kind, hold=request.hold,
                        resolution=resolution, band=request.band)  # fmt: skip
+
+
+def _column(record: Record, name: str) -> str:
+    """A column by its name, or by its name without the unit that stands in brackets behind it."""
+    bare = [n for n in record.names if re.sub(r"\s*[\[(][^\[(]*[\])]$", "", n) == name]
+    return bare[0] if name not in record.names and len(bare) == 1 else name
 
 
 def _scaled(record: Record, command: str, signals: Mapping[str, str], request: LogRequest) -> Record:

@@ -129,8 +129,9 @@ class FrequencyResponse:
 
     @property
     def magnitude_dB(self) -> Array:
-        """Magnitude (F, n) [dB]."""
-        return 20 * np.log10(np.abs(self.response))
+        """Magnitude (F, n) [dB], minus infinity where an output does not move."""
+        with np.errstate(divide="ignore"):
+            return 20 * np.log10(np.abs(self.response))
 
     @property
     def states_coherence(self) -> bool:
@@ -140,7 +141,8 @@ class FrequencyResponse:
     @property
     def error(self) -> Array:
         """Standard deviation of the relative error of the magnitude, and of the phase [rad], shape (F, n)."""
-        return np.sqrt(self.variance / 2) / np.abs(self.response)
+        size = np.abs(self.response)
+        return np.where(size > 0, np.sqrt(self.variance / 2) / np.where(size > 0, size, 1.0), np.inf)
 
     def only(self, rows: ArrayLike) -> FrequencyResponse:
         """The same at some of the frequencies: a mask or indices."""
