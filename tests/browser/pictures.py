@@ -1,4 +1,7 @@
-"""Pictures of the bench for the documentation: `python -m tests.browser.pictures docs/images`."""
+"""Pictures of the bench for the documentation: `python -m tests.browser.pictures docs/images`; `sweep` takes that one.
+
+It is the sweep of a flexible shaft, whose mode is measured, in real time: two minutes.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,11 @@ from websockets.sync.client import connect
 from tests.browser.runs import record_first_motions, twin
 from tests.browser.students import DESK, PHONE, Server, Student, browser, student
 
-NAMES = ("bench_run", "bench_identify", "bench_design", "bench_track", "bench_guide", "bench_phone", "bench_class")
+NAMES = (
+    "bench_run", "bench_identify", "bench_sweep", "bench_design", "bench_track", "bench_guide", "bench_phone",
+    "bench_class",
+)  # fmt: skip
+SHAFT = 'kind = "twin"\nname = "shaft"\nmake = "torsional"\n'
 FIRST = [
     "Ada", "Ben", "Chen", "Dilek", "Émile", "Fatma", "Goran", "Hana", "Ivo", "Jana", "Kofi", "Lena", "Mats", "Nadia",
     "Omar", "Pia", "Quentin", "Rosa", "Søren", "Tomás", "Uta", "Vera", "Wei", "Xenia", "Yusuf", "Zoë", "Anouk", "Björn",
@@ -77,6 +84,21 @@ def take_fit(folder: Path, server: Server) -> None:
         picture.quantize(128, dither=Image.Dither.NONE).save(folder / "bench_identify.png", optimize=True)
 
 
+def take_sweep(folder: Path, server: Server) -> None:
+    """Identify, of a sweep that has just come to its end."""
+    with browser() as chromium, student(chromium, server, screen="identify", rig="shaft") as one:
+        one.page.click("#record-sweep")
+        one.reads("#record-says", r"(\d+) of \1 sines measured")
+        one.sees("ended")
+        one.page.wait_for_selector("#fit-log option", state="attached")
+        one.page.locator("#record-title").scroll_into_view_if_needed()
+        one.page.mouse.move(0, 300)
+        one.page.wait_for_timeout(500)
+        picture = Image.open(BytesIO(one.page.screenshot()))
+        picture.quantize(128, dither=Image.Dither.NONE).save(folder / "bench_sweep.png", optimize=True)
+        one.leaves()
+
+
 def guided(one: Student) -> None:
     """Three predictions, and the paper's first and last set of poles after a tap each."""
     one.page.click("#guide-toggle")
@@ -119,16 +141,28 @@ def take_class(folder: Path, server: Server) -> None:
         page.screenshot(path=folder / "bench_class.png")
 
 
-if __name__ == "__main__":
+def take_all(folder: Path) -> None:
+    """Every picture but that of the sweep."""
     with tempfile.TemporaryDirectory() as runs:
         record_first_motions(twin(Path(runs)), Path(runs) / "furuta", started=time.time())
         opened = Server(Path(runs), fifo=True)
-        take(Path(sys.argv[1]), opened)
-        take_fit(Path(sys.argv[1]), opened)
+        take(folder, opened)
+        take_fit(folder, opened)
         opened.close()
     with tempfile.TemporaryDirectory() as runs:
         listed = Path(runs) / "roster.csv"
         listed.write_text("name\n" + "\n".join(f"{n} {c}." for c in "AB" for n in FIRST), encoding="utf-8")
         opened = Server(Path(runs), fifo=True, roster=listed)
-        take_class(Path(sys.argv[1]), opened)
+        take_class(folder, opened)
+        opened.close()
+
+
+if __name__ == "__main__":
+    if sys.argv[2:] != ["sweep"]:
+        take_all(Path(sys.argv[1]))
+    with tempfile.TemporaryDirectory() as runs:
+        shaft = Path(runs) / "shaft.toml"
+        shaft.write_text(SHAFT, encoding="utf-8")
+        opened = Server(Path(runs), shaft, fifo=True)
+        take_sweep(Path(sys.argv[1]), opened)
         opened.close()
