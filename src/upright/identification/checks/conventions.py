@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.identification.search.starts import regress, samples_of
+from upright.workers import share
 
 CLEAR = 0.5
 """Another convention is named when it leaves less than this share of the variance that the declared one leaves."""
@@ -30,16 +31,16 @@ def wrong_conventions(rig: GreyBox, runs: Sequence[Run]) -> tuple[str, ...]:
         return ()
     measured = sorted({c for run in runs for c in run.measured if c not in run.held})
     angles = {c.name for c in rig.plant.coordinates if c.unit == "rad"}
-    best, changes = declared, ({}, {})
+    others: list[tuple[dict[str, float], dict[str, float]]] = []
     for signs in itertools.product((1.0, -1.0), repeat=len(measured)):
         for turned in itertools.product((0.0, math.pi), repeat=len(measured)):
-            flips = dict(zip(measured, signs, strict=True))
             turns = {c: t for c, t in zip(measured, turned, strict=True) if t and c in angles}
-            if len(turns) != sum(1 for t in turned if t) or not (turns or -1.0 in signs):
-                continue
-            left = _unexplained(rig, runs, flips, turns)
-            if left < CLOSER * best:
-                best, changes = left, (flips, turns)
+            if len(turns) == sum(1 for t in turned if t) and (turns or -1.0 in signs):
+                others.append((dict(zip(measured, signs, strict=True)), turns))
+    best, changes = declared, ({}, {})
+    for (flips, turns), left in zip(others, share(lambda o: _unexplained(rig, runs, *o), others), strict=True):
+        if left < CLOSER * best:
+            best, changes = left, (flips, turns)
     if best > CLEAR * min(declared, 1.0):  # what explains next to nothing is no better convention
         return ()
     flips, turns = changes
