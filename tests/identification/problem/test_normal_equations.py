@@ -10,48 +10,63 @@ from upright.identification.problem.normal_equations import Normal, products, ps
 CHANCE = np.random.default_rng(8)
 
 
-def lanes(samples: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
-    """Two outputs of three lanes, a target, offsets and gains of the sensors."""
+COLUMNS = (0, 2)
+"""Of four rows, those that two sensors show."""
+
+
+def lanes(samples: int, count: int = 3) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Four rows of so many lanes, two outputs' targets, offsets and gains of the sensors."""
     return (
-        [CHANCE.normal(size=(samples, 3)) for _ in range(2)], CHANCE.normal(size=(samples, 2)),
-        CHANCE.normal(size=(2, 3)), 1 + 0.1 * CHANCE.normal(size=(2, 3)),
+        CHANCE.normal(size=(samples, 4, count)), CHANCE.normal(size=(samples, 2)),
+        CHANCE.normal(size=(2, count)), 1 + 0.1 * CHANCE.normal(size=(2, count)),
     )  # fmt: skip
 
 
 def expected(simulated: list[np.ndarray], target: np.ndarray) -> np.ndarray:
     """``B'B`` with the first lane's error and the others' differences from it as columns, all outputs."""
     z = np.concatenate(simulated)
-    B = np.column_stack([z[:, 0] - target.T.reshape(-1), z[:, 1] - z[:, 0], z[:, 2] - z[:, 0]])
+    B = np.column_stack([z[:, 0] - target.T.reshape(-1), *(z[:, 1:] - z[:, :1]).T])
     return B.T @ B
 
 
-@pytest.mark.parametrize("samples", [5, 512, 513, 1300])
+@pytest.mark.parametrize("samples", [5, 1024, 1025, 2300])
 @pytest.mark.parametrize("scaled", [True, False])
-def test_squares_are_those_of_errors_and_differences_whatever_the_blocks(samples: int, scaled: bool) -> None:
-    z, y, offset, scale = lanes(samples)
-    weights = np.array([2.0, 0.5])
-    shown = [w * ((s if scaled else 1.0) * a + o) for w, s, a, o in zip(weights, scale, z, offset, strict=True)]
-    found = squares(z, y, offset, np.diag(weights), scale if scaled else None)
-    assert np.allclose(found, expected(shown, y * weights))
-    held = squares(z, y, offset, np.diag([0.0, 0.5]), scale if scaled else None)
-    assert np.allclose(held, expected(shown[1:], 0.5 * y[:, 1:]))
+@pytest.mark.parametrize("count", [1, 3, 16, 17])
+def test_squares_are_those_of_errors_and_differences_whatever_the_blocks(
+    samples: int, scaled: bool, count: int
+) -> None:
+    z, y, offset, scale = lanes(samples, count)
+    weights, both = np.array([2.0, 0.5]), z[:, COLUMNS].swapaxes(0, 1)
+    shown = [w * ((s if scaled else 1.0) * a + o) for w, s, a, o in zip(weights, scale, both, offset, strict=True)]
+    found = squares(z, COLUMNS, y, offset, np.diag(weights), scale if scaled else None)
+    assert np.allclose(found, expected(shown, y * weights), rtol=1e-12, atol=1e-12 * samples)
+    held = squares(z, COLUMNS, y, offset, np.diag([0.0, 0.5]), scale if scaled else None)
+    assert np.allclose(held, expected(shown[1:], 0.5 * y[:, 1:]), rtol=1e-12, atol=1e-12 * samples)
+
+
+def test_samples_that_do_not_count_are_as_if_they_were_not_there() -> None:
+    z, y, offset, _ = lanes(200)
+    kept = np.flatnonzero(CHANCE.random(200) < 0.4)
+    z[kept[0] + 1 : kept[1]] = np.nan
+    found = squares(z, COLUMNS, y, offset, np.eye(2), kept=kept)
+    assert np.allclose(found, squares(z[kept], COLUMNS, y[kept], offset, np.eye(2)), rtol=1e-12)
 
 
 @pytest.mark.parametrize("scaled", [True, False])
 def test_combinations_of_outputs_are_squared_as_such(scaled: bool) -> None:
     z, y, offset, scale = lanes(50)
-    W = np.array([[1.0, -1.0], [0.3, 2.0]])
-    shown = [(s if scaled else 1.0) * a + o for s, a, o in zip(scale, z, offset, strict=True)]
+    W, both = np.array([[1.0, -1.0], [0.3, 2.0]]), z[:, COLUMNS].swapaxes(0, 1)
+    shown = [(s if scaled else 1.0) * a + o for s, a, o in zip(scale, both, offset, strict=True)]
     together = [W[k, 0] * shown[0] + W[k, 1] * shown[1] for k in range(2)]
-    found = squares(z, y, offset, W, scale if scaled else None)
+    found = squares(z, COLUMNS, y, offset, W, scale if scaled else None)
     assert np.allclose(found, expected(together, y @ W.T))
 
 
 def test_a_lane_that_ran_away_makes_every_square_infinite_unless_its_output_has_no_weight() -> None:
     z, y, offset, _ = lanes(20)
-    z[1][7, 2] = 1e200
-    assert np.all(np.isinf(squares(z, y, offset, np.eye(2))))
-    assert np.all(np.isfinite(squares(z, y, offset, np.diag([1.0, 0.0]))))
+    z[7, COLUMNS[1], 2] = 1e200
+    assert np.all(np.isinf(squares(z, COLUMNS, y, offset, np.eye(2))))
+    assert np.all(np.isfinite(squares(z, COLUMNS, y, offset, np.diag([1.0, 0.0]))))
 
 
 @pytest.mark.parametrize("rows", [1, 63, 64, 65, 4000])

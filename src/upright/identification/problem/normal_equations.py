@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.simulation.lowering.routine import Routine
+
 Array = NDArray[np.float64]
+Places = NDArray[np.int64]
 
 NULL = 1e-6
 """Singular values of the scaled Jacobian below this share of the largest are zero: finite differences are no better."""
@@ -48,6 +52,12 @@ class Normal:
 BLOCK = 1024
 """Samples whose lanes stay near the processor."""
 
+VECTOR = 16
+"""Lanes that machine code takes at once, as the kernel of a plant does."""
+
+TEXT = Path(__file__).with_suffix(".kernel").read_text(encoding="utf-8")
+"""What `squares` sums, in the language of kernels."""
+
 
 def finite(values: Array) -> bool:
     """Whether all values are finite, tested by their sum: one pass without a temporary."""
@@ -76,44 +86,49 @@ def slopes(lanes: Array, steps: Array, *, central: bool = False) -> Array:
     return out
 
 
-def squares(lanes: Sequence[Array], target: Array, offset: Array, W: Array, scale: Array | None = None) -> Array:
+def squares(
+    motion: Array, columns: Sequence[int], target: Array, offset: Array, W: Array, scale: Array | None = None,
+    kept: Places | None = None,
+) -> Array:  # fmt: skip
     """``B'B`` (p, p) of what p lanes miss and how they differ, ``B = W (z_0 - y, z_1 - z_0, ...)``.
 
     Parameters
     ----------
-    lanes : sequence of (T, p) arrays
-        Simulated outputs, one after another; they are multiplied by `scale`, then `offset` is added, (outputs, p) each.
+    motion : (T, rows, lanes) array
+        Simulated states, at least p lanes; their `columns` are multiplied by `scale`, then `offset` is added,
+        (outputs, p) each. Fastest where the lanes are a multiple of `VECTOR`.
     target : (T, outputs) array
         Measured outputs.
-    W : (rows, outputs) array
+    W : (combinations, outputs) array
         Weights of the outputs, or of combinations of them; an output that has none may run away.
+    kept : (samples,) array, optional
+        The samples that count, all when omitted.
 
     Notes
     -----
-    In blocks small enough to stay near the processor.
+    In blocks small enough to stay near the processor. Every operation is rounded by itself: where stiction makes a
+    staircase of the cost, a last bit may lead a search to another step.
     """
-    lengths = len(lanes), BLOCK, offset.shape[1]
-    blocks, mixed, total = np.empty(lengths), np.empty(lengths[1:]), np.zeros((lengths[2],) * 2)
-    rows = [[(int(k), float(row[k])) for k in np.flatnonzero(row)] for row in W if row.any()]
-    scaled = {k: scale is not None and bool((scale[k] != 1.0).any()) for row in rows for k, _ in row}
+    outputs, p = offset.shape
+    if more := -motion.shape[2] % VECTOR:
+        motion = np.pad(motion, ((0, 0), (0, 0), (0, more)), mode="edge")
+    width, W = motion.shape[2], W[W.any(axis=1)]
+    gain, shift = np.ones((outputs, width)), np.zeros((outputs, width))
+    shift[:, :p] = offset
+    if scale is not None:
+        gain[:, :p] = scale
+    kept = np.arange(target.shape[0]) if kept is None else kept
+    block, first, total = np.empty((len(W), BLOCK, width)), np.zeros(1, dtype=np.int64), np.zeros((p, p))
+    fill = Routine(
+        TEXT, "differences", motion, np.array(columns, dtype=np.int64), np.ascontiguousarray(target), kept, W, gain,
+        shift, first, block, vectors=True,
+    )  # fmt: skip
     with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the sum infinite
-        for first in range(0, target.shape[0], BLOCK):
-            here = slice(first, first + BLOCK)
-            B = blocks[:, : target[here].shape[0]]
-            for k, own in scaled.items():
-                z = lanes[k][here]
-                if own and scale is not None:
-                    z = np.multiply(z, scale[k], out=B[k])
-                if offset[k].any():
-                    z = np.add(z, offset[k], out=B[k])
-                unmoved = z[:, :1].copy()
-                np.subtract(z[:, 1:], unmoved, out=B[k, :, 1:])
-                np.subtract(unmoved[:, 0], target[here, k], out=B[k, :, 0])
-            for (k, weight), *others in rows:
-                together = np.multiply(B[k], weight, out=mixed[: B.shape[1]])
-                for other, its in others:
-                    together += its * B[other]
-                total += together.T @ together
+        for begin in range(0, kept.size, BLOCK):
+            first[0] = begin
+            fill()
+            for B in block[:, : kept.size - begin, :p]:
+                total += B.T @ B
     return total if finite(total) else np.full_like(total, math.inf)
 
 

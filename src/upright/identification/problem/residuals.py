@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from upright.identification.model.grey_box import GreyBox, base_values, neutral
 from upright.identification.model.runs import Run
-from upright.identification.problem.normal_equations import Normal, finite, products, slopes, squares
+from upright.identification.problem.normal_equations import VECTOR, Normal, finite, products, slopes, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
 from upright.identification.problem.simulated import (
     discrete_model,
@@ -356,10 +356,12 @@ class Problem:
         if thread not in self._memory or self._memory[thread].size < most:
             self._memory[thread] = np.empty(most)
         motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory[thread])
-        skip = min(track.first, n - 1)
-        counts = slice(skip, n) if track.retained is None else np.flatnonzero(track.retained[:n])
-        observed = [motion[counts, c] for c in track.columns]
-        G = squares(observed, track.y[counts], d.offsets, track.weighting, d.scales)
+        if sought.size:  # with the lanes that fill up a vector
+            width = -(-motion.shape[2] // VECTOR) * VECTOR
+            motion = self._memory[thread][: n * motion.shape[1] * width].reshape(n, -1, width)
+        kept = np.arange(min(track.first, n - 1), n)
+        kept = kept if track.retained is None else np.flatnonzero(track.retained[:n])
+        G = squares(motion, track.columns, track.y, d.offsets, track.weighting, d.scales, kept)
         h = self.steps[sought]
         with np.errstate(over="ignore", invalid="ignore"):  # a lane that ran away makes the cost infinite
             return G[1:, 1:] / np.outer(h, h), G[1:, 0] / h, float(G[0, 0])

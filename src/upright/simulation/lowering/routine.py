@@ -26,14 +26,17 @@ class Routine:
         Of a module, as `Module` takes it.
     *given : array, float or int
         Its arguments; arrays of float64 or int64 whose numbers lie one behind the other.
+    vectors : bool
+        Whether its loops over ``_i`` become vector instructions.
     """
 
-    def __init__(self, text: str, name: str, *args: Argument) -> None:
+    def __init__(self, text: str, name: str, *args: Argument, vectors: bool = False) -> None:
         from upright.simulation.lowering import machine
 
         self._args = args  # whose places the words say
         self._words = b"".join(_word(x) for x in args)
-        self._call = machine.function(_address(text, name, tuple(_type(x) for x in args)))
+        lanes = machine.lanes() if vectors else 1
+        self._call = machine.function(_address(text, name, tuple(_type(x) for x in args), lanes))
 
     def __call__(self) -> None:
         """Run it once."""
@@ -41,15 +44,14 @@ class Routine:
 
 
 @cache
-def _address(text: str, name: str, types: tuple[Type, ...]) -> int:
+def _address(text: str, name: str, types: tuple[Type, ...], lanes: int) -> int:
     from upright.simulation.lowering import machine
 
     def compiled() -> bytes:
-        return machine.compiled(Module(text, 1).entry(name, types, machine.platform()))
+        return machine.compiled(Module(text, lanes).entry(name, types, machine.platform()))
 
-    return machine.address_of(
-        stored_code.code(stored_code.key(stored_code.lowered_by(), name, repr(types), text), compiled), name
-    )
+    key = stored_code.key(stored_code.lowered_by(), name, repr(types), str(lanes), text)
+    return machine.address_of(stored_code.code(key, compiled), name)
 
 
 def _type(x: Argument) -> Type:
