@@ -1,10 +1,12 @@
-"""What does the log of a run lose when its process is killed, its file is torn or changed, its disk is full?
+"""What does a run's log lose when its process is killed, its file is damaged, or its disk is full?
 
-Rows are handed over at 1 kHz of the clock on the wall, to several logs side by side; each log's process is killed
-(`kill -9`) at a random moment, and what is then in the file is read. Every row is a function of its number, so that a
-wrong one cannot hide. A second series hands rows over as fast as they are taken, so that kills land inside writes.
-Torn files are cut at a random byte, every other one with zeros behind; changed files have one random byte changed.
-What a row costs the loop is timed by the clock on the wall: the longest are when the machine did other work.
+- **Kills.** Several logs record side by side at 1 kHz in real time. Each log's process is killed (`kill -9`) at a
+  random moment, and the file is read as it is then. A second series writes rows as fast as they are accepted, so
+  that kills land inside writes.
+- **Damage.** Files are cut at a random byte, every other one with zeros behind it, or have one random byte changed.
+- **Cost.** The time of one row in the loop is measured in real time; the longest are when the machine did other work.
+
+Every row is a function of its number, so a wrong row cannot hide.
 """
 
 from __future__ import annotations
@@ -233,10 +235,10 @@ def kill_line(name: str, kills: Sequence[Kill], *, timed: bool) -> Line:
     worst = float(lost.max()) * PERIOD if not (bad or broken or readable < len(kills)) else math.inf
     note = (
         f"readable {readable} of {len(kills)}; rows lost: median {np.median(lost):.0f}, most {lost.max()}; wrong rows "
-        f"{bad}; logs that lost a row which status() had said to be written {broken}; told to the loop {told}"
+        f"{bad}; logs that lost a row which status() had reported as written {broken}; reported to the loop {told}"
     )
     if not timed:
-        return Line(contender=name, note=f"{note}; up to {BACKLOG} rows waited in the ring, which die with the process")
+        return Line(contender=name, note=f"{note}; up to {BACKLOG} rows waited in the ring, lost with the process")
     return Line(contender=name, seconds=(worst, worst, worst), target=Target(most=0.1, of="seconds"), note=note)
 
 
@@ -271,7 +273,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         progress("a full disk")
         if sys.platform == "linux":
             on, message, said, there, bad = full(30_000)
-            note = f'on {on}: "{message}"; rows said to be there {said}, read {there}, wrong {bad}; the loop ran on'
+            note = f'on {on}: "{message}"; rows reported as written {said}, read {there}, wrong {bad}; the loop ran on'
             lines.append(Line(contender="disk full", error=float(bad), note=note))
         else:
             lines.append(Line(contender="disk full", note="left out: needs tmpfs or prlimit of Linux"))
@@ -290,7 +292,11 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             f"{os.cpu_count()} processors ({platform.machine()}) shared with others, Python {platform.python_version()}"
         )
         head = ["", f"Measured on {machine}.", "", "| | worst loss, or median | |", "|---|---|---|"]
-        markdown.write_text(page("crash", "Logs that end badly", __doc__, [*head, *table]), encoding="utf-8")
+        result = (
+            f"A log whose process was killed at 1 kHz lost at most its last {_seconds(lines[0])}, and "
+            f"{sum(x.error or 0 for x in lines):.0f} wrong rows were read from damaged files or a full disk."
+        )
+        markdown.write_text(page("crash", "Logs that end badly", __doc__, [*head, *table], result), encoding="utf-8")
     return lines
 
 

@@ -1,12 +1,14 @@
-"""Does this machine keep time for a loop? A minute at 1 kHz at real-time priority, and at ordinary priority beside it.
+"""Does this machine keep time for a loop? A minute at 1 kHz, at real-time priority and at ordinary priority.
 
-What is asked, at most 30 late ticks of 60,000, is asked of real-time priority (FIFO) on an idle machine; the other rows
-say what a user without that priority has, and what a rate costs. A tick is late when its deadline had passed before the
-loop was back to wait for it, or when it was woken a period or more behind; late ticks are counted, never caught up.
-The work of a tick is that of a run, law and supervision with its bank of filters, and is asked to take 0.1 ms; a twin
-stands for the rig, and what it takes to move is not in that. "Time for" is the fastest rate for which work, vigil and
-late wake-ups seem to leave time, where that is faster than what was tried.
-The last column says for how long the host of a virtual machine gave its processors to others meanwhile.
+Required, at real-time priority (FIFO) on an idle machine: at most 30 late ticks of 60,000, and 0.1 ms for the work of a
+tick. The other rows show what a user without that priority gets, and what a higher rate costs.
+
+- *late*: ticks whose deadline had passed before the loop was back to wait for it, or that woke a period or more behind.
+  They are counted and never caught up.
+- *work*: controller and supervision of a tick with its bank of filters. A twin stands for the rig; its simulation is
+  not included.
+- *time for*: the fastest rate for which work and late wake-ups leave time, where that is above the rate tried.
+- *taken by host*: how long the host of a virtual machine gave its processors to others meanwhile.
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
                 "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]  # fmt: skip
         rows = [_row(found) for found in all_of_them]
         content = [*head, *rows, "", *_histogram(all_of_them)]
-        markdown.write_text(page("jitter", "Jitter", __doc__, content), encoding="utf-8")
+        markdown.write_text(page("jitter", "Jitter", __doc__, content, _result(all_of_them[0])), encoding="utf-8")
     return lines
 
 
@@ -73,6 +75,13 @@ def _lines(found: Jitter, *, asked: bool) -> list[Line]:
         note=f"p50 {1e6 * np.median(found.work):.0f}, p99 {1e6 * np.percentile(found.work, 99):.0f} us",
     )
     return [late, work]
+
+
+def _result(of: Jitter) -> str:
+    return (
+        f"{of.late} of {of.due} ticks were late at {1 / of.period:.0f} Hz and {of.standing.priority} priority "
+        f"(at most {TOLERATED * of.due:.0f} allowed); the longest wake-up was {1e6 * of.quantiles['max']:.0f} µs late."
+    )
 
 
 def _histogram(loops: list[Jitter]) -> list[str]:

@@ -110,11 +110,12 @@ def library(name: str, what: str, part: str, *size: int, **more: Any) -> Callabl
     return build
 
 
-def page(name: str, title: str, about: str | None, body: Sequence[str]) -> str:
-    """Published page of a benchmark, opened by what its module says of itself."""
+def page(name: str, title: str, about: str | None, body: Sequence[str], headline: str = "") -> str:
+    """Published page of a benchmark: the question, the result in a sentence, the method as its module states it."""
     first, _, *rest = (about or "").strip().splitlines()
     command = f"Written by `python -m benchmarks {name} --markdown benchmarks/{name}.md`."
-    return "\n".join([f"# {title}: {first}", "", command, *rest, *body]) + "\n"
+    result = [f"**{headline}**", ""] if headline else []
+    return "\n".join([f"# {title}: {first}", "", *result, command, "", *rest, *body]) + "\n"
 
 
 def built(builders: dict[str, Callable[[], Contender]]) -> tuple[list[Contender], list[Line]]:

@@ -1,23 +1,31 @@
-"""What stops a rig when something breaks, how soon, and how far did it go by then? Every hazard, broken on purpose.
+"""What stops a rig when something breaks, how soon, and how far has it moved by then? Every hazard, caused on purpose.
 
-A Furuta pendulum (make furuta, numbers of another rig than the law's) stands in a loop at 1 kHz (the twin: 1131 Hz) and
-is stirred by a tap; then something breaks. *Zero after* is the time from that until the drive gets nothing for good:
-the converter at zero or the power stage off, to a tick; *arm* is how far the arm was from where it was held, at the
-farthest, until a second after that; *lean* how far the pendulum leaned when the output went to zero, after which it
-falls freely. Both are true motions, not what encoders show. Zero output does not brake: what turns fast when its limit
-is reached coasts on, so travel needs a limit on speed beside it. Where the host's loop stops a rig whose drive and arm
-encoder it trusts, it brakes the arm first, 0.3 s at most, and that counts in *zero after*.
+A Furuta pendulum of make furuta, with parameters that differ from its controller's, is stabilised upright at 1 kHz (the
+twin: 1131 Hz). A tap sets it moving, then something breaks. The columns:
 
-Four rigs are broken, all with the supervisor of `upright run` beside them. The twin is the simulator with dry friction,
-delay and lag. The firmware is the program of a board with a pendulum inside (viscous friction, no delay or lag), once
-with the loop on the host and once on the board; the ATmega2560's own program runs under simavr, from encoder edges to
-frames of its converter. Time is virtual: it passes by a tick for every exchange that is answered, and by as many ticks
-as the host waits for an answer that does not come. A host is really killed: its process holds the pendulum and gets
-SIGKILL; the dead host lets no time pass, so that the board is told to go on tick by tick from there, or, where the row
-says so, it runs by the clock on the wall.
+- *zero after*: time from the fault until the drive gets nothing any more. That is the converter at zero or the power
+  stage off, to a tick. Where the host's loop trusts drive and arm encoder, it first brakes the arm for at most 0.3 s,
+  which is included.
+- *arm*: largest distance of the arm from its set point, until a second after that.
+- *lean*: angle of the pendulum when the output went to zero. From there it falls freely.
 
-This is supervision in software, not a rated safety function, and a simulation cannot show what a bench does: a rig
-needs a stop in hardware besides.
+Arm and lean are the true motion, not what encoders show. Zero output does not brake: an arm that is fast at its limit
+coasts past it. A limit on travel therefore needs a limit on speed beside it.
+
+Four rigs are broken, all under the supervisor of `upright run`:
+
+- the twin: the simulator with dry friction, delay and lag
+- the firmware with the loop on the host: the board's program with a simulated pendulum inside (viscous friction, no
+  delay or lag)
+- the firmware with the loop on the board
+- the ATmega2560's own program in simavr, from encoder edges to frames of its converter
+
+Time is virtual: one tick per exchange that is answered, and as many ticks as the host waits for an answer that does not
+come. A host is really killed: its process controls the pendulum and gets SIGKILL. No virtual time passes for a dead
+host, so the test advances the board tick by tick from there; rows "by the clock on the wall" run in real time instead.
+
+This is supervision in software, not a rated safety function, and a simulation does not replace a test on the bench. A
+rig also needs an emergency stop in hardware.
 """
 
 from __future__ import annotations
@@ -318,19 +326,27 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     if markdown:
         missed = [f"- {line.contender} ({line.note})" for line in lines if line.reached is False]
         travel = f"{math.degrees(LIMITS.travel[0]):.0f} degrees"
-        last = ["", "## Not as it should be", "", *(missed or ["No hazard passed its interlock, or its time."]), ""]
+        last = [
+            "",
+            "## Not as required",
+            "",
+            *(missed or ["Every hazard was stopped by its interlock and in time."]),
+            "",
+        ]
         if late:
             last += [
-                f"Stopped by the right interlock, but the arm went beyond its travel of {travel}, driven or coasting:",
+                f"Stopped by the right interlock, but the arm passed its travel limit of {travel}, driven or coasting:",
                 "",
                 *late,
             ]
-        markdown.write_text(page("safety", "Safety", __doc__, [*body, *last]), encoding="utf-8")
+        judged_lines = [line for line in lines if line.reached is not None]
+        result = f"{len(judged_lines) - len(missed)} of {len(judged_lines)} cases ended as required."
+        markdown.write_text(page("safety", "Safety", __doc__, [*body, *last], result), encoding="utf-8")
     return lines
 
 
 HEAD = (
-    "| hazard | stopped by | zero after | arm | lean | what the user is told |",
+    "| hazard | stopped by | zero after | arm | lean | message |",
     "|---|---|--:|--:|--:|---|",
 )
 
@@ -342,5 +358,5 @@ def written(hazard: Hazard, found: Happened, right: bool) -> str:
         after = "never on" if not found.arm else after
     arm = f"{math.degrees(found.arm):.1f}°" if found.arm else "–"
     lean = f"{math.degrees(found.lean):.1f}°" if found.lean else "–"
-    by = found.stopped_by.replace(" | ", ", ") + ("" if right else " **(not as it should be)**")
+    by = found.stopped_by.replace(" | ", ", ") + ("" if right else " **(not as required)**")
     return f"| {hazard.what} | {by} | {after} | {arm} | {lean} | {found.told} |"

@@ -1,9 +1,11 @@
-"""How much faster are more workers, and where does it stop? Closed loops of 2 s and whole fits, shared by processes.
+"""How much faster are several worker processes, and where does it stop? Closed loops of 2 s and whole fits.
 
-One item is a block of 256 Furuta pendulums held upright with exact dry friction, or the identification of one rig.
-One process and two take turns in one run, best of several; the machine is shared with others, so CPU seconds stand
-beside those on the wall, and the speed-up that they allow: CPU of one over half the CPU of two and what handing out
-cost. More workers than there are processors are simulated: real processes that wait as long as an item took.
+One item is a block of 256 Furuta pendulums stabilised upright with exact dry friction, or the identification of one
+rig. One process and two take turns within one run, and the best of several turns counts.
+
+The machine is shared with other work, so CPU seconds stand beside seconds on the wall. The speed-up by CPU is the CPU
+time of one process over half that of two, dispatch included. More workers than processors are simulated: real processes
+that wait for as long as an item takes.
 """
 
 from __future__ import annotations
@@ -100,7 +102,7 @@ def duel(name: str, task: Any, items: Sequence[Any], two: Workers, rounds: int) 
              note=f"{len(items)} items, {least:.3g} s of CPU, {1e3 * least / len(items):.3g} ms an item"),
         Line(contender=f"{name}, {'a Dask cluster of two' if two.cluster else 'two processes'}", rounds=rounds,
              seconds=(other.wall,) * 3, ratio=(other.wall / one.wall,) * 3, target=Target(most=1 / ASKED),
-             note=f"{one.wall / other.wall:.2f} times as fast on the wall, {allowed:.2f} by CPU (asked: {ASKED}): "
+             note=f"{one.wall / other.wall:.2f} times as fast on the wall, {allowed:.2f} by CPU (required: {ASKED}): "
              f"items {least_two:.3g} s of CPU, handing out {1e3 * handing / len(items):.2g} ms an item; results "
              f"{'the same to the last bit' if same else 'NOT the same'}"),
     ]  # fmt: skip
