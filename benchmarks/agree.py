@@ -1,13 +1,15 @@
-"""Do two parts of what one rig did say the same of it? 95 % intervals of each, fitted alone. Needs UPRIGHT_REAL_DATA.
+"""Do two parts of one rig's data give the same numbers? 95 % intervals of each, fitted alone. Needs UPRIGHT_REAL_DATA.
 
-Parts are halves of a run, runs of one study, and studies of one rig; both are asked what the study asks. Halves are of
-the stretch in which a run moves, its rest cut off, and begin anywhere. What cannot be cut is named with the reason: a
-law whose state at the cut nobody logged, a half that moves too little.
+Parts are halves of a run, runs of one study, and studies of one rig. Both parts are fitted for the parameters that
+the study estimates. A run is halved within the stretch in which it moves, and a half may begin in mid-motion. What
+cannot be halved is listed with the reason: a controller whose state at the cut is not in the log, or a half that moves
+too little.
 
-A pair agrees when its intervals share a value. Numbers that a part cannot see, or knew, are not compared; a pair in
-which an interval is wider than ten times the larger value is counted apart, since it agrees with anything. Frequencies
-are imaginary parts of the poles where the rig hangs or rests. Asked: at least 90 % of the pairs agree. Of honest
-independent pairs 95 to 99.4 % do, most where both are as wide.
+A pair agrees when its intervals share a value. Parameters that a part cannot determine, or that were known, are not
+compared. A pair with an interval wider than ten times the larger value is counted apart, since it agrees with anything.
+Frequencies are imaginary parts of the poles where the rig hangs or rests.
+
+Required: at least 90 % of the pairs agree. Of honest independent pairs 95 to 99.4 % do, most where both are as wide.
 """
 
 from __future__ import annotations

@@ -1,9 +1,12 @@
 """How many unseen samples lie inside 90 % bands, on real rigs and on twins with physics that their models lack?
 
-Unseen are runs that a study only predicts; every run in turn, predicted with its band from a fit of the others; and of
-a study of one run the last third, predicted from a fit of the rest. The twins are rigs of `misfit`, each fitted to one
-run of 8 s and predicting another with other commands, or from another angle. Of signals that move freely each counts
-alike, whatever its number of samples. Asked: 85 to 95 % over all real rigs.
+Unseen samples are those that a fit only predicts:
+
+- the runs that a study predicts, and every fitted run in turn, from a fit of the others
+- of a study with one run, its last third, from a fit of the rest
+- of twins (the rigs of `misfit`), a second run with other commands or another start, from a fit of one run of 8 s
+
+Each signal that moves freely counts alike, whatever its number of samples. Required: 85 to 95 % over all real rigs.
 """
 
 from __future__ import annotations

@@ -1,12 +1,22 @@
-"""What comes of a stranger's log that goes unedited through `show`, `init`, `identify` and `design`?
+"""What becomes of a log that nobody edits, through `show`, `init`, `identify` and `design`?
 
-Every public log (UPRIGHT_REAL_DATA) and 100 logs of twins, 20 of each plant, each written in three dialects: units in
-brackets with commas; milliseconds and degrees or millimetres, semicolons and decimal commas; units behind underscores
-with tabs. The twins have dry friction, encoder counts and noise of 0 to 0.005 rad; they rest for a second, are driven
-by steps or let go, and rest again. A number is usable when the fit is trusted and calls it well determined; it is wrong
-when its interval misses the truth and it is a fifth off. A placeholder that `init` writes must not be among usable
-numbers or what they rest on, no more than a tenth of what moves may be left out without a word, each log is to take
-10 s of CPU at most, and the three dialects of one log must come to the same answer.
+The logs are every public log (UPRIGHT_REAL_DATA) and 100 logs of twins, 20 of each plant. Each is written in three
+dialects:
+
+- units in brackets, commas
+- milliseconds and degrees or millimetres, semicolons and decimal commas
+- units behind underscores, tabs
+
+The twins have dry friction, encoder counts and noise of 0 to 0.005 rad. They rest for a second, are driven by steps or
+released, and rest again. A parameter is usable when the fit is trusted and calls it well determined. It is wrong when
+its interval misses the truth and it is a fifth off.
+
+Required:
+
+- no placeholder that `init` writes is among usable parameters or what they rest on
+- no more than a tenth of the motion is left out without a word
+- each log takes 10 s of CPU at most
+- the three dialects of one log give the same answer
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """How many steps a second does a learner get, beside the public environment of the same kind?
 
-A step is 20 ms of a Furuta pendulum with exact dry friction on both joints (once without any, as the public one has
-none), on a rig that was drawn from a covariance, with reward, ends and new beginnings; the action is another one in
-every lane. The public one is CartPole-v1 without friction in one Euler step of 20 ms: as Gymnasium runs any environment
-in a vector (`SyncVectorEnv`), and in the version of it that was written by hand for NumPy, which no other environment
-has. CPU seconds of one thread, in turns.
+A step is 20 ms of a Furuta pendulum with exact dry friction on both joints (once without any, as the public environment
+has none), on a rig drawn from a covariance, with reward, ends and resets. Every parallel copy gets another action.
+
+The public environment is CartPole-v1, without friction, in one Euler step of 20 ms. It runs twice: as Gymnasium runs
+any environment in a vector (`SyncVectorEnv`), and in its hand-written NumPy version, which no other environment has.
+CPU seconds of one thread, in turns.
 """
 
 from __future__ import annotations

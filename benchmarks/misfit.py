@@ -1,11 +1,19 @@
-"""How often do 95 % intervals hold the truth on rigs whose physics the model does not have?
+"""How often do 95 % intervals contain the truth on rigs whose physics the model does not have?
 
-The rigs of `rigs`, 40 of each plant, moved by equations with more in them than is fitted, each at a size as logs of
-real rigs show it: dry friction that is larger close to rest (Stribeck, up to 50 %), torque that ripples with the
-drive's angle (up to 1 % of the command), play of the encoders (up to 0.06 degrees or 50 um), a frame out of level by
-up to 0.3 degrees, commands 0 to 2 ms late, a belt through which a tenth of the driven inertia is driven (resonant at 30
-to 60 Hz), encoders that sit off centre (up to 0.1 degrees), and 0.3 % of coloured noise. Fits start 20 to 40 % off and
-know nothing of this. Asked: 90 to 99 % of all intervals, and at least 85 % of each kind of number.
+The rigs are those of `rigs`, 40 of each plant. They move by equations with more effects than are fitted, each as large
+as logs of real rigs show it:
+
+- dry friction that is larger close to rest: Stribeck, up to 50 %
+- torque that ripples with the drive's angle: up to 1 % of the command
+- play of the encoders: up to 0.06 degrees or 50 um
+- encoders off centre: up to 0.1 degrees
+- a frame out of level: up to 0.3 degrees
+- commands that arrive 0 to 2 ms late
+- a belt through which a tenth of the driven inertia is driven, resonant at 30 to 60 Hz
+- 0.3 % of coloured noise
+
+Fits start 20 to 40 % off and know nothing of this. Required: 90 to 99 % of all intervals, and at least 85 % for each
+kind of parameter.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""Does a rig whose wiring nobody has checked come upright in a minute, or is the fault named?
+"""Does a rig with unchecked wiring come upright in a minute, or is the fault named?
 
-Twins of a Furuta pendulum and of a pendulum on a cart, each with numbers of its own, are given faults of their wiring
-at random: motor leads swapped, channels of an encoder swapped, counts other than described, a supply at 40 to 60 %; a
-fifth have none, a third have two. Each is put before `upright lab --rig RIG.toml --quick`, which knows of them what
-their maker's data sheet says. Right is: upright at the end where the wiring is (with the weak supply named, where there
-is one), or no loop closed and every fault named. Of drive, body and pendulum, two turned round are the third turned
-round, seen in a mirror, and all three none: so they count. Travel is what the driven body truly did, not what its
-encoder showed. Counts that are 2.4 % off (1024 for 1000) are not looked for: a loop bears them.
+Twins of a Furuta pendulum and of a pendulum on a cart, each with parameters of its own, get random wiring faults: motor
+leads swapped, channels of an encoder swapped, counts other than described, a supply at 40 to 60 %. A fifth have none, a
+third have two. Each is run by `upright lab --rig RIG.toml --quick`, which knows what its maker's data sheet says.
+
+With correct wiring the right answer is a rig that is upright at the end, and a weak supply named where there is one.
+With a fault it is no closed loop and every fault named. Of drive, body and pendulum, two reversed are the third one
+reversed, seen in a mirror, and all three reversed are none; they count so. Travel is the true motion of the driven
+body, not what its encoder showed. Counts that are 2.4 % off (1024 for 1000) need not be noticed: a loop tolerates them.
 """
 
 from __future__ import annotations

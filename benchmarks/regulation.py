@@ -1,19 +1,22 @@
-"""Do loops hold as often as predicted? 500 random twins, each identified, predicted and then run.
+"""Do controllers stabilise as often as predicted? 500 random twins, each identified, predicted and then run.
 
-Every twin is another pendulum on a cart or Furuta, its numbers some percent off the design. It is identified by itself:
-half a volt up and down for 2 s while it hangs, both encoders logged every 8 ms with noise of 0.05 to 2 degrees on top,
-and Gauss-Newton on the nonlinear model with dry friction for six numbers and the drive's gain; the covariance is what
-that noise leaves, with the rig model's spread of friction known beforehand. Noise is all that is wrong there, so that
-the covariance is honest; twins identified by frequency response, as in experiment 1b, are looked at apart.
-Poles are one of Table 1's sets, velocities come from plain or filtered differences or a Kalman filter, the limit is 2
-to 5 V and the command up to 4 ms late. The start (tilt and tap in some proportion) lies about the edge of what the
-identified model recovers. The probability predicted is the share that holds of 200 rigs drawn from the covariance, each
-with dry friction of its own day and its own error of the hand; then the law runs once on the true rig, with the
-friction of its day and one hand.
+- **Rigs.** Every twin is another pendulum on a cart or Furuta pendulum, its parameters some percent off the design.
+- **Identification.** Half a volt up and down for 2 s while it hangs, both encoders logged every 8 ms with noise of
+  0.05 to 2 degrees. Gauss-Newton on the nonlinear model with dry friction estimates six parameters and the drive's
+  gain. The covariance is what the noise leaves, with the rig model's spread of friction as prior. Noise is the only
+  error here, so the covariance is honest; twins identified by frequency response, as in experiment 1b, are listed
+  apart.
+- **Controller.** Poles are one of Table 1's sets. Velocities come from plain or filtered differences or a Kalman
+  filter. The limit is 2 to 5 V and the command up to 4 ms late.
+- **Start.** Tilt and tap in some proportion, about the edge of what the identified model recovers from.
+- **Prediction.** The share that is stabilised of 200 rigs drawn from the covariance, each with its own day-to-day
+  friction and its own error of the hand. The controller then runs once on the true rig, with the friction of its day
+  and one hand.
+
 Twins of a third kind have physics that the model lacks (`upright.experiments.nonideal`: friction larger close to rest,
-ripple, latency, a frame out of level, encoders with play and off centre), and their fits leave many times their errors
+ripple, latency, a frame out of level, encoders with play and off centre). Their fits leave many times their errors
 unexplained. Where a twin is identified as in 1b, the probability is that of `upright regulate`: over the fit's
-covariance, the friction law close to rest and day-to-day variation.
+covariance, friction close to rest and day-to-day variation.
 """
 
 from __future__ import annotations

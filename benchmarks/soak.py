@@ -1,20 +1,22 @@
 """Does a supervised loop last an hour at 1 kHz with a fault every few seconds, and lose nothing?
 
-Twins of both pendulums are held upright in virtual time by the sampled law, each under its supervisor, its log written
-by a process of its own. Every 2 to 8 s something goes wrong, drawn from a seed: an encoder dies, counts backwards,
-twice or four times as far, or loses counts, the host falls silent or hands over no number, somebody asks for a stop,
-the pendulum is hit. Then the rig is brought back and started again. The firmware's host port goes through the like in
-lockstep, under its own limits alone, with the loop on the host and on the microcontroller in turns.
+Twins of both pendulums are stabilised upright in virtual time by the sampled controller, each under its supervisor,
+with its log written by a process of its own. Every 2 to 8 s a fault is drawn from a seed: an encoder dies, counts
+backwards, twice or four times as far, or loses counts; the host falls silent or sends no number; somebody requests a
+stop; the pendulum is hit. Then the rig is brought back and started again. The firmware's host port goes through the
+same in lockstep, under its own limits alone, with the loop on the host and on the microcontroller in turn.
 
-Counted are stops that left a command or the power stage on when they were told (asked: none), faults that were neither
-stopped nor outlived within 5 s, stops without a fault, rows of the log or samples against ticks of the rig (asked:
-all), and the memory and open files of the process at the end against those after its first tenth (asked: none lost).
+Counted, and required:
 
-Of the firmware a sample that does not follow on from the one before it, as after each silence of the host, is no row.
+- stops that left a command or the power stage on: none
+- faults that were neither stopped nor outlived within 5 s, and stops without a fault
+- rows of the log, or samples, against ticks of the rig: all (of the firmware, a sample that does not follow on from the
+  one before it, as after each silence of the host, is no row)
+- memory and open files of the process at the end against those after its first tenth: none lost
 
 Frames are corrupted by the million on their way to the host's parser: bytes changed, lost, doubled, cut short, run
-together; a frame that nobody sent and that is accepted is counted (asked: none). What the firmware makes of a million
-inputs, sound frames among them, is asked of libFuzzer with its address and undefined-behaviour sanitizers.
+together. A frame that was never sent and is accepted is counted (required: none). LibFuzzer, with its address and
+undefined-behaviour sanitizers, feeds the firmware a million inputs, healthy frames among them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Does a search end where the cost is least, wherever it begins? Studies of real rigs from random guesses.
 
 Every guess is multiplied by ``exp(0.3 z)``, z normal: a factor of two is one in fifty. Costs are those of the whole
-model, weighed as by the study's own fit, and a search has found the lowest known where it ends within half a percent of
-it. Of each study as many starts are run, of 300, as a number of CPU seconds allows (`--starts`, `--seconds`), but at
-least three: the page is of 8 seconds a study. Needs UPRIGHT_REAL_DATA. Asked: 95 % of the starts.
+model, weighted as by the study's own fit. A search reaches the lowest cost known when it ends within half a percent of
+it. Of each study as many of 300 starts run as a number of CPU seconds allows (`--starts`, `--seconds`), at least three:
+this page allows 8 seconds a study. Needs UPRIGHT_REAL_DATA. Required: 95 % of the starts.
 """
 
 from __future__ import annotations

@@ -1,14 +1,20 @@
-"""What was said of a fit, and what came: the verdict's answers against runs, rigs and loops that it never saw.
+"""How often are a verdict's answers right: against runs, rigs and loops that the fit never saw?
 
 Of each plant 120 rigs of `misfit` are fitted to the first two thirds of a record and predict its last third. One in
-four is asked too little (viscous friction alone, the truth four times as dry), one in four has a record of a second and
-a half. What came is a whole other record as long, under other commands (80 % of each signal are asked, where the exact
-motion without the noise would reach as much: where nothing moves no model can); each number, within its interval or a
-fifth of the truth where it was called usable, not within a twentieth where it was not; and the plant upright under the
-loop that the fit would place. Of real rigs with three fitted runs or more all but two are fitted, one is predicted, and
-the last is what came, where it moves no body that the others held. Asked: a wrong yes in at most 5 of 100 cases, a
-wrong no in at most 15. "In part" is neither: the model lacks what its runs show, or was not tested by what was held
-out, or its own bands allow more to be missed.
+four is fitted with too little physics (viscous friction alone, the truth four times as dry), and one in four has a
+record of a second and a half. Three answers are checked:
+
+- *Does it predict?* against a whole other record as long, under other commands: 80 % of each signal must be explained
+  where the exact motion without the noise would be. Where nothing moves, no model can.
+- *Are the numbers right?* A number called usable must lie within its interval or a fifth of the truth. One called
+  unusable must not lie within a twentieth.
+- *Does it stabilise?* against the plant, upright under the controller that the fit would place.
+
+Of real rigs with three fitted runs or more, all but two runs are fitted, one is predicted, and the last one decides,
+where it moves no body that the others held fixed.
+
+Required: a wrong yes in at most 5 of 100 cases, a wrong no in at most 15. "In part" is neither: the model lacks what
+its runs show, was not tested by the runs held out, or its own bands allow a larger miss.
 """
 
 from __future__ import annotations
