@@ -43,6 +43,7 @@ FIT = {
     "correlation": [[1.0, 0.3], [0.3, 1.0]],
     "bands": {
         "level": 0.9, "quantile": 1.8, "names": ["J_p"], "covariance": [[1e-9]], "reached": {"x_dot": 0.4},
+        "slow": [{"coulomb": "b_1c", "speed": 0.2, "moves": [-0.5]}],
         "spreads": {"x": [{"horizon": 0.0, "start": 1e-3, "end": 1e-3}]},
     },
 }  # fmt: skip

@@ -16,7 +16,6 @@ from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import ProvisionalFit, refit_without_outliers
 from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
-from upright.identification.inference.bands import calibrated
 from upright.identification.inference.black_box import black_box
 from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Identifiability, Optimum, assess, identifiability
@@ -33,6 +32,7 @@ from upright.identification.inference.poles import poles, shared_values
 from upright.identification.inference.scoring import fit_percent, predict, score_run
 from upright.identification.inference.so_far import Lookout, SoFar
 from upright.identification.inference.ties import ties, with_ties
+from upright.identification.inference.unseen.bands import calibrated
 from upright.identification.inference.verdict import judge, trusted
 from upright.identification.inference.verdict.evidence import Evidence
 from upright.identification.inference.verdict.predicts import GOOD

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from upright.basis import NOT_TRUSTED, RESERVED, TRUSTED, Basis
 from upright.errors import BadInput, ImpossiblePhysics
 from upright.files import read_text
-from upright.identification.model.bands import Bands, Spread
+from upright.identification.model.bands import Bands, SlowFriction, Spread
 from upright.identification.model.fit import Estimate, Judgement
 from upright.identification.model.grey_box import SUBSTEPS
 from upright.physics import PLANTS, Plant, find
@@ -328,6 +328,7 @@ def _bands(entry: Any) -> Bands:
         spreads=spreads, names=tuple(names), covariance=covariance,
         logs=tuple(_text(log, "bands.logs") for log in _list(table.get("logs", []), "bands.logs")),
         reached={n: _number(v, f"bands.reached.{n}") for n, v in _table(table.get("reached"), "bands.reached").items()},
+        slow=tuple(_slow(part, len(names)) for part in _list(table.get("slow", []), "bands.slow")),
     )  # fmt: skip
 
 
@@ -335,6 +336,17 @@ def _scaled(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     size = np.sqrt(np.abs(np.diag(covariance)))
     size[size == 0] = 1.0
     return covariance / np.outer(size, size)
+
+
+def _slow(entry: Any, numbers: int) -> SlowFriction:
+    table = _table(entry, "bands.slow")
+    moves = [_number(v, "bands.slow.moves", LARGEST**2) for v in _list(table.get("moves"), "bands.slow.moves")]
+    if len(moves) > numbers:
+        raise BadInput(f"bands.slow.moves must have at most {numbers} numbers, one for each of bands.names")
+    return SlowFriction(
+        coulomb=_text(table.get("coulomb"), "bands.slow.coulomb"), moves=np.array(moves),
+        speed=_positive(table.get("speed"), "bands.slow.speed"),
+    )  # fmt: skip
 
 
 def _spread(entry: Any, place: str) -> Spread:

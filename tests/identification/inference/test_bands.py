@@ -9,9 +9,9 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, shaken, swing
 from upright.identification.estimate import identify, predict
-from upright.identification.inference.bands import possible, recalibrated
-from upright.identification.inference.promise import promise
-from upright.identification.inference.reach import beyond, reached
+from upright.identification.inference.unseen.bands import possible, recalibrated
+from upright.identification.inference.unseen.promise import promise
+from upright.identification.inference.unseen.reach import beyond, reached
 from upright.identification.ladder.cross_validation import cross_validate
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.model.fit import Fit, RunScore

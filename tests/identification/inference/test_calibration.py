@@ -14,9 +14,9 @@ import pytest
 from scipy import stats
 
 from upright.identification import GreyBox, Parameter, Run
-from upright.identification.inference.bands import calibrated, recalibrated, sensitivity
 from upright.identification.inference.covariance import Optimum, assess
 from upright.identification.inference.scoring import predict, score_run
+from upright.identification.inference.unseen.bands import calibrated, recalibrated, sensitivity
 from upright.identification.model.bands import Bands, Spread
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.simulated import with_noise

@@ -10,9 +10,9 @@ import pytest
 from tests.identification.twins import FURUTA, PENDULUM, noisy, rig, swing
 from upright.identification import Parameter, Run
 from upright.identification.estimate import identify
-from upright.identification.inference.bands import FRICTION, MANY, of_another_day
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.neglected import OFFSET, Neglected, consider, with_force
+from upright.identification.inference.unseen.bands import FRICTION, MANY, of_another_day
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate, Fit
 from upright.identification.problem.residuals import formulate

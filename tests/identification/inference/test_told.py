@@ -27,7 +27,7 @@ from upright.identification.inference.intervals import (
     widened,
     with_left_out,
 )
-from upright.identification.inference.reach import beyond, reached
+from upright.identification.inference.unseen.reach import beyond, reached
 from upright.identification.model.fit import Assumption, Estimate
 from upright.identification.problem.normal_equations import Normal
 from upright.identification.problem.residuals import formulate

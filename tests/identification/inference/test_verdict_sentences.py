@@ -11,7 +11,7 @@ import pytest
 
 from tests.identification.twins import FURUTA, PENDULUM, rig
 from upright.identification.inference.loop import Standing
-from upright.identification.inference.promise import promise
+from upright.identification.inference.unseen.promise import promise
 from upright.identification.inference.verdict import judge, trusted
 from upright.identification.inference.verdict.evidence import Evidence
 from upright.identification.inference.verdict.predicts import uninformative

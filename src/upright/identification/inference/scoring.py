@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from upright.identification.inference.bands import banded
 from upright.identification.inference.ceiling import ceilings, judged
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.intervals import run_estimates
+from upright.identification.inference.unseen.bands import banded
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, Offer, RunScore
 from upright.identification.model.grey_box import GreyBox

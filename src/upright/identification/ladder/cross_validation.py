@@ -14,9 +14,9 @@ from functools import partial
 import numpy as np
 
 from upright.errors import BadInput
-from upright.identification.inference.bands import calibrated, recalibrated
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.scoring import predict
+from upright.identification.inference.unseen.bands import calibrated, recalibrated
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Fit, RunScore
 from upright.identification.model.grey_box import GreyBox

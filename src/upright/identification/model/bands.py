@@ -37,12 +37,25 @@ class Spread:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SlowFriction:
+    """Dry friction `coulomb` [SI] of a joint below the peak `speed` [SI] of the slowest swing that was fitted.
+
+    Each unit [SI] that it is larger there `moves` (names,) the fitted numbers [SI].
+    """
+
+    coulomb: str
+    speed: float
+    moves: Array
+
+
+@dataclass(frozen=True, kw_only=True)
 class Bands:
     """How wide a band around a prediction is: `quantile` times the root of two variances.
 
     One is that of what the fit leaves over, `spreads` by signal; the other what the uncertainty of the numbers `names`,
     with the `covariance` [SI], does to this prediction. `reached` is the largest size of every command, speed, position
-    and horizon of the fitted runs, see `upright.identification.inference.reach`, `logs` are the logs they are from.
+    and horizon of the fitted runs, see `upright.identification.inference.unseen.reach`, `logs` are the logs they
+    are from, and `slow` is friction at speeds below theirs.
     """
 
     quantile: float
@@ -51,6 +64,7 @@ class Bands:
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
     reached: Mapping[str, float] = field(default_factory=dict[str, float])
     logs: tuple[str, ...] = ()
+    slow: tuple[SlowFriction, ...] = ()
     level: float = LEVEL
 
     def spread(self, signal: str, horizon: float | None) -> Spread | None:

@@ -253,7 +253,7 @@ def _named(runs: Mapping[str, RunScore], label: str) -> RunScore:
 
 def prediction(runs: Mapping[str, RunScore], plant: Plant, bands: Bands | None) -> Prediction:
     """Scores as an answer."""
-    from upright.identification.inference.promise import promise
+    from upright.identification.inference.unseen.promise import promise
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part
 

@@ -78,8 +78,8 @@ def predict(
         When model or study cannot be read, or speak of different plants.
     """
     from upright.files import write_json
-    from upright.identification.inference.promise import promise
     from upright.identification.inference.scoring import predict as score
+    from upright.identification.inference.unseen.promise import promise
     from upright.report.fit.pictures import score_pictures
     from upright.report.fit.tables import score_table
     from upright.report.page import Chapter, Part, Step

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Optimum, student
 from upright.identification.inference.loop import matrix_root
-from upright.identification.inference.reach import beyond, reached
-from upright.identification.model.bands import LEVEL, NORMAL, Bands, Spread
+from upright.identification.inference.unseen.reach import beyond, reached
+from upright.identification.inference.unseen.slower import considered, slow_friction
+from upright.identification.model.bands import LEVEL, NORMAL, Bands, SlowFriction, Spread
 from upright.identification.model.fit import RunScore
 from upright.identification.model.grey_box import NOISE, GreyBox, Parameter
 from upright.identification.model.runs import LEAST_RUN, Run
@@ -47,6 +48,9 @@ MOST = 5.0
 FRICTION, GAIN = 0.13, 0.1
 """Standard deviations, relative, of friction and gain from log to log: friction of two runs of one day differed by
 13 %, and two of the public rigs drift by 10 to 20 % between days."""
+
+CLOSE_TO_REST = 0.29
+"""Root mean square of what friction at low speeds is larger by, relative: up to a half on logs of real rigs."""
 
 MANY = 3
 """Logs from which on a fit has seen how much they differ."""
@@ -113,6 +117,7 @@ def calibrated(best: Optimum) -> Bands | None:
         names=tuple(problem.unknowns[i].name for i in shared),
         covariance=possible(covariance[np.ix_(shared, shared)] * np.outer(slope, slope)),
         reached=reached(problem.rig, [track.run for track in best.problem.tracks]),
+        slow=considered(best, shared),
         logs=tuple(dict.fromkeys(log for track in problem.tracks if (log := log_name(track.run)))),
     )
     missed = [_missed(problem, met[block.run], block, covariance, best.x, bands) for block in blocks]
@@ -225,6 +230,20 @@ def of_another_day(bands: Bands, rig: GreyBox, run: Run) -> Array:
     return bands.covariance + np.outer(friction, friction) + np.outer(gain, gain)
 
 
+def with_slow_friction(C: Array, names: Sequence[str], rig: GreyBox, slow: Sequence[SlowFriction]) -> Array:
+    """The covariance (names + slow, names + slow) with friction at low speeds beside that at others."""
+    follows = np.array([[float(n == each.coulomb) for n in names] for each in slow]).reshape(len(slow), len(names))
+    J = np.vstack([np.eye(len(names)), follows])
+    out = J @ C @ J.T
+    for k, each in enumerate(slow):
+        moves = np.concatenate([each.moves, np.zeros(len(names) - each.moves.size)])
+        step = J @ moves
+        step[len(names) + k] += 1.0
+        step *= CLOSE_TO_REST * rig.parameters[each.coulomb].value
+        out += np.outer(step, step)
+    return out
+
+
 def _signals(track: Track) -> list[tuple[int, str]]:
     return [(k, track.run.measured[k]) for k in track.run.free]
 
@@ -324,9 +343,11 @@ def banded(
     parameters = {n: Parameter(name=n, value=ACTUATOR[n].default) for n in bands.names if n in ACTUATOR}
     parameters |= rig.parameters
     names = [n for n in bands.names if n in parameters and math.isfinite(parameters[n].value)]
+    slow = [] if run.filtered else list(slow_friction(rig, run, bands.slow))
     if run.filtered:  # what disturbs a plant between two samples counts, not its numbers
         names = []
     uncertain = {n: replace(parameters[n], estimate=True) for n in names}
+    uncertain |= {p.name: p for _, *pair in slow for p in pair}
     problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, stated=groups)
     if run.filtered and plain.horizon is not None:
         problem = problem.ahead(plain.horizon)
@@ -339,14 +360,15 @@ def banded(
         age, variance = met.age, np.full(plain.y.shape, math.inf)
         if met.finite:
             slope = adapted(problem, 0, met.slope, x)
-            places = [bands.names.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
+            uncertain_by = [*bands.names, *(stiction.name for _, stiction, _ in slow)]
+            C = with_slow_friction(of_another_day(bands, rig, run), bands.names, rig, [each for each, *_ in slow])
+            places = [uncertain_by.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
                       for i in problem.sought_in(0)]  # fmt: skip
             shared = np.flatnonzero(np.array(places) >= 0)
             rows = np.array(places)[shared]
             value = problem.value(x)
             natural = np.array([1 / value[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
-            C = of_another_day(bands, rig, run)[np.ix_(rows, rows)]
-            variance = _variance((slope * natural)[..., shared], C)
+            variance = _variance((slope * natural)[..., shared], C[np.ix_(rows, rows)])
     width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
     return replace(
         plain, band={c: bands.quantile * w for c, w in width.items()}, beyond=beyond(rig, run, bands.reached)
