@@ -62,11 +62,18 @@ class Server:
         """End it as a crash does."""
         self.process.kill()
         self.process.wait()
+        self._forget()
 
     def close(self) -> None:
         """End it as `kill` does; Ctrl-C is not heard where these tests run in a shell's background."""
         self.process.terminate()
         self.process.wait(PATIENCE / 1000)
+        self._forget()
+
+    def _forget(self) -> None:
+        """Close its output: a file that is left open is reported in whatever test comes next."""
+        if self.process.stdout is not None:
+            self.process.stdout.close()
 
 
 class Student:
