@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cache, reduce
 
 import numpy as np
@@ -157,8 +157,12 @@ def _provisional(
         problem, x = _best_so_far(rig, fitted, log)
         optimum = Descent(x=x, normal=problem.normal(x), converged=False, interrupted=True)
 
+    assessed: list[_Assessed] = []  # of the last optimum, which values and whole fit share
+
     def conclude(end: Descent, *, values: bool = False) -> Fit:
-        fit = _conclude(rig, runs, problem, end, log, watch=watch, values=values)
+        if not assessed or not np.array_equal(assessed[-1].best.x, end.x):
+            assessed[:] = [_Assessed(best=assess(problem, end.x))]
+        fit = _conclude(rig, runs, assessed[-1], end, log, watch=watch, values=values)
         return replace(fit, method=method, seconds=time.perf_counter() - began)
 
     def whole() -> Fit:
@@ -267,8 +271,16 @@ def _skipped(runs: Sequence[Run], *, watch: bool) -> tuple[str, ...]:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Assessed:
+    """What is known of an optimum for its values already: its covariance, and `scores` of its runs by horizon."""
+
+    best: Optimum
+    scores: dict[float | None, dict[str, RunScore]] = field(default_factory=dict[float | None, dict[str, RunScore]])
+
+
 def _conclude(
-    requested: GreyBox, runs: Sequence[Run], problem: Problem, end: Descent, log: SearchLog, *, watch: bool,
+    requested: GreyBox, runs: Sequence[Run], assessed: _Assessed, end: Descent, log: SearchLog, *, watch: bool,
     values: bool,
 ) -> Fit:  # fmt: skip
     """Everything known about an optimum; of an interrupted search, or for `values` alone, only what takes no time.
@@ -277,7 +289,7 @@ def _conclude(
 
     Where the motion runs away nothing is known of how sure the numbers are, and nothing is predicted.
     """
-    best = assess(problem, end.x)
+    best, problem = assessed.best, assessed.best.problem
     identifiable = identifiability(best)
     warnings = list(log.warnings)
     brief = values or end.interrupted or bool(best.lost)
@@ -331,7 +343,7 @@ def _conclude(
     bands = None if brief else calibrated(best)
     bands = None if bands is None else reduce(with_force, forces, bands)
     ahead = None if best.lost else judged(problem, best.x)
-    scores = _scores(best, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
+    scores = _scores(assessed, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
     skipped = _skipped(runs, watch=watch) if end.interrupted else ()
     if skipped:
         warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
@@ -390,7 +402,8 @@ def _conclude(
         path=tuple(log.path),
         interrupted=end.interrupted,
         not_evaluated=skipped,
-        poles={} if identifiable.hidden else _poles(best, assumed),  # a pole may depend on what the data cannot see
+        # a pole may depend on what the data cannot see
+        poles={} if values or identifiable.hidden else _poles(best, assumed),
         assumptions=assumed,
         bands=bands,
         failed=bool(best.lost),
@@ -398,17 +411,14 @@ def _conclude(
 
 
 def _scores(
-    best: Optimum, runs: Sequence[Run], estimates: dict[str, Estimate], groups: dict[str, dict[str, Estimate]],
+    assessed: _Assessed, runs: Sequence[Run], estimates: dict[str, Estimate], groups: dict[str, dict[str, Estimate]],
     bands: Bands | None, log: SearchLog, ahead: float | None,
 ) -> dict[str, RunScore]:  # fmt: skip
-    problem, rig = best.problem, best.problem.rig
+    problem, rig = assessed.best.problem, assessed.best.problem.rig
     fitted = [run for run in runs if run.role == "fit"]
-    thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
-    whole = formulate(rig, fitted, thin=False) if thinned else problem
-    scores = {
-        run.label: replace(score_run(whole, i, best.x, ahead), guess=score_run(whole, i, whole.start, ahead).simulated)
-        for i, run in enumerate(fitted)
-    }
+    if ahead not in assessed.scores:
+        assessed.scores[ahead] = _fitted_scores(assessed.best, fitted, ahead)
+    scores = dict(assessed.scores[ahead])
     values = {n: e.value for n, e in estimates.items()}
     known = {label: {n: e.value for n, e in group.items()} for label, group in groups.items()}
     others = [r for r in runs if r.role != "fit"]
@@ -417,6 +427,18 @@ def _scores(
         held_out = next(run for run in others if run.label == label)
         scores[label] = replace(predicted, black_box=black_box(fitted, held_out, pace))
     return {run.label: scores[run.label] for run in runs}
+
+
+def _fitted_scores(best: Optimum, fitted: Sequence[Run], ahead: float | None) -> dict[str, RunScore]:
+    problem = best.problem
+    thinned = any(t.y.shape[0] < t.run.t.size for t in problem.tracks)
+    whole = formulate(problem.rig, fitted, thin=False) if thinned else problem
+    return {
+        run.label: replace(
+            score_run(whole, i, best.x, ahead), guess=score_run(whole, i, whole.start, ahead).simulated
+        )
+        for i, run in enumerate(fitted)
+    }  # fmt: skip
 
 
 def _correlation(best: Optimum, identifiable: Identifiability) -> Array:
