@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.peers import black_boxes, ours
+import upright as up
+from benchmarks.peers import black_boxes, ours, qube
 from benchmarks.peers.task import Samples, Task, fit_percent, study_text
 
 M_P, L_CG, G = 0.2, 0.25, 9.81
@@ -70,3 +71,35 @@ def test_fit_percent_of_the_mean_is_zero():
     run = swing(2.0)
     assert fit_percent(run, run.y) == [100.0]
     assert fit_percent(run, np.full_like(run.y, run.y.mean())) == [pytest.approx(0.0, abs=1e-9)]
+
+
+def test_the_qube_of_the_peers_moves_as_the_plant_of_upright_does():
+    """Ahead of every start by the equations written out, and by those derived from the energies."""
+    p = {"l_cg": 0.0645, "J_p": 3.3e-5, "J_d": 6e-5, "b_1": 2.1e-4, "b_1c": 0.0, "k_psi": 1e-3}
+    m_p, r, g, gain, dt = 0.024, 0.085, 9.81, 5e-3, 2e-3
+    t = dt * np.arange(400)
+    u = 2 * np.sin(9 * t) + np.sin(23 * t)
+    arm = up.Furuta(m_p=m_p, r=r, g=g, **p)
+    motion = up.simulate(arm, u=np.append(gain * u, 0.0), seconds=400 * dt, dt=dt, start={"theta": "170 deg"})
+    names = ("psi", "theta", "psi_dot", "theta_dot")
+    states = motion.to_pandas()[list(names)].to_numpy()[:400]
+    run = qube.Episode(u=u, y=states[:, :2], states=states, dt=dt)
+    first = run.starts(50)
+    y = qube.ahead(np.array([*p.values(), 0.0]), np.array([m_p, r, g, gain]), np.zeros(2), run, first, 50)
+    assert y == pytest.approx(run.y[first[:, None] + 1 + np.arange(50)], abs=1e-5)
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_arx_predicts_a_linear_plant_ahead_exactly(step):
+    """A discrete oscillator that is driven by a command held for as long as ARX looks at once."""
+    g = np.random.default_rng(1)
+    u = np.repeat(g.normal(size=400), 5)
+    y = np.zeros((2000, 2))
+    for k in range(2, 2000):
+        y[k] = [1.9, 1.8] * y[k - 1] - [0.97, 0.9] * y[k - 2] + [0.1, 0.05] * u[k - 1 : k]
+    y, u = y - y[:1000].mean(axis=0), u - u[:1000].mean()
+    y, u = y[::step], u[::step]
+    run = qube.Episode(u=u, y=y, states=np.zeros((y.shape[0], 4)), dt=0.01)
+    predicted = qube.arx([run], 4, 1)(run, 0.2)
+    at = run.starts(20) + 20
+    assert predicted == pytest.approx(run.y[at], abs=1e-6 * float(np.abs(y).max()))
