@@ -98,12 +98,12 @@ SHOWN: Mapping[str, Shown] = {
         targets={"nominal": 90.0},
     ),
     "crash": Shown(
-        label="read again, of all logs, or of all rows said to be written [%]",
+        label="read again, of all logs, or of all rows reported as written [%]",
         series={
             "logs, or rows": Cell(
                 at=1,
                 pattern=r"(?:readable |rows from |, read )(\d+)",
-                whole=r"(?:^|readable \d+ of |rows said to be there )(\d+)(?: files|;|,)",
+                whole=r"(?:^|readable \d+ of |rows reported as written )(\d+)(?: files|;|,)",
             ),
             "rows of a log, median": Cell(at=1, pattern=r"rows kept (\d+) %"),
         },
