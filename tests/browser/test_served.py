@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import random
 import threading
 import time
+import tracemalloc
 import urllib.error
 import urllib.request
 from contextlib import contextmanager, suppress
@@ -295,6 +297,32 @@ def test_a_flood_is_refused_and_a_stop_in_it_is_not(served):
                 page.ask("release")
         assert page.closed() == 4400
     assert station.state == "stopped"
+
+
+def test_who_comes_back_is_known_and_nothing_is_kept_of_who_has_left(rig, tmp_path):
+    with station(rig, tmp_path / "one") as (made, _, _), station(rig, tmp_path / "two") as (other, _, _):
+        hub, another = Hub(made), Hub(other)
+
+        def came(me):
+            who, outbox = hub.join(me)
+            hub.leave(outbox)
+            return who
+
+        first = came("")
+        assert came(first) == first
+        elsewhere, _ = another.join(first)
+        for made_up in ("", "made-up", elsewhere, f"x{first}", f"{first}0", first.partition(".")[0], "é.\udc80"):
+            assert came(made_up) not in {first, made_up}
+        for _ in range(100):
+            came("")
+        tracemalloc.start()
+        before, _ = tracemalloc.get_traced_memory()
+        for _ in range(1000):
+            came("")
+        gc.collect()
+        kept = tracemalloc.get_traced_memory()[0] - before
+        tracemalloc.stop()
+        assert kept < 30_000  # bytes; a name of each would be 100,000
 
 
 def test_who_takes_nothing_holds_nobody_up(rig, tmp_path):

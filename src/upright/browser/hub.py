@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hmac
 import json
 import secrets
 import time
@@ -17,7 +18,6 @@ BEHIND = 0.25
 """How long a frame is put off at most where this machine is too slow for all of them [s]."""
 MOST = 256
 """Clients of a rig at most."""
-_REMEMBERED = 4096
 
 
 class Hub:
@@ -26,7 +26,7 @@ class Hub:
     def __init__(self, station: Station) -> None:
         self.station = station
         self.clients: dict[Outbox, str] = {}
-        self._issued: dict[str, None] = {}  # who has been here, the oldest first
+        self._key = secrets.token_bytes(32)
         self._rig, self._last_use, self._step = station.rig, station.last_use, _step(station)
         self._next, self._late, self._answered, self._followed, self._desk = 0, 0, 0, 0, station.desk
         self._shown: Any = None
@@ -37,10 +37,7 @@ class Hub:
         """A client, as who they were before where `me` is one that was issued here; None where there are too many."""
         if len(self.clients) >= MOST:
             return None
-        who = me if me in self._issued else secrets.token_urlsafe(16)
-        self._issued[who] = self._issued.pop(who, None)
-        while len(self._issued) > _REMEMBERED:
-            self._issued.pop(next(iter(self._issued)))
+        who = me if self._issued(me) else self._signed(secrets.token_urlsafe(16))
         outbox = Outbox()
         self.clients[outbox] = who
         self.station.lease.back(who)
@@ -49,6 +46,14 @@ class Hub:
         outbox.note(self._scene_of(who))
         outbox.note(json.dumps(self.station.described(who)))
         return who, outbox
+
+    def _signed(self, name: str) -> str:
+        """Who somebody is, in such a way that nobody else can make it up and nothing has to be kept of them."""
+        return f"{name}.{hmac.digest(self._key, name.encode(errors='replace'), 'sha256').hex()[:32]}"
+
+    def _issued(self, me: str) -> bool:
+        signed = self._signed(me.rpartition(".")[0])
+        return hmac.compare_digest(*(text.encode(errors="replace") for text in (signed, me)))
 
     def leave(self, outbox: Outbox) -> None:
         """A connection has ended."""
