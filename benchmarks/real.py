@@ -16,7 +16,7 @@ from benchmarks.asked import ASKED, Asked, studies
 from benchmarks.measure import Line, Target, spread
 
 STUDIES = Path(__file__).parents[1] / "examples" / "studies"
-TARGET = Target(most=30.0, of="seconds")
+TARGET = Target(most=5.0, of="seconds")
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from upright.identification.problem.residuals import formulate
 from upright.signals.smoothing import dominant_period
 from upright.signals.spikes import spikes, without
 from upright.signals.stretches import stretches
+from upright.workers import share
 
 Array = NDArray[np.float64]
 
@@ -104,19 +105,18 @@ def outliers(fit: Fit, rig: GreyBox, runs: Sequence[Run]) -> tuple[Outlier, ...]
         what its law remembers is not in the log; so is a predicted one with numbers of its own, since those are not in
         the fit.
     """
-    out: list[Outlier] = []
-    stretches: list[Stretches] = []
     known = rig.with_values({n: e.value for n, e in fit.estimates.items()})
-    for run in runs:
+
+    def searched(run: Run) -> tuple[list[tuple[float, str]], Stretches | None]:
         clean, jumped = without_spikes(run)
-        if jumped:
-            out.append(_spiky(run, jumped))
         own = _estimated_for(fit, run)
         missing = {*run.unknown, *run.shared} - {"initial", *own}
         blind = run.loop is not None or (run.role != "fit" and missing)
-        halves = None if blind else half_swings(known, clean, own)
-        if halves is not None:
-            stretches.append(halves)
+        return jumped, None if blind else half_swings(known, clean, own)
+
+    each = list(share(searched, runs))
+    out = [_spiky(run, jumped) for run, (jumped, _) in zip(runs, each, strict=True) if jumped]
+    stretches = [halves for _, halves in each if halves is not None]
     spread = _spread([s.run for s in stretches])
     for s in stretches:
         out += _strange(s, _judges(s, stretches), spread)
