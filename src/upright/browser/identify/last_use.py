@@ -73,12 +73,12 @@ def take_up(came: BenchRig, fits: Identifications, folder: Path) -> tuple[BenchR
     last = f"When the bench last ran, {came.name} was used with {' and '.join(parts)}"
     offer = ({"fit": fit} if fit else {}) | ({} if memory is None else {"memory": memory})
     if fit and all(each["id"] != fit for each in fits.listed()):
-        return came, LastUse(sentence=f"{last}. That fit is no longer there, so that it is as it came.")
+        return came, LastUse(sentence=f"{last}. That fit is no longer there, so that it starts as it came.")
     if came.kind == HARDWARE:
         why = "It can really move, so that this waits until you confirm it on the screen Identify."
         return came, LastUse(sentence=f"{last}. {why}", offer=offer)
     if not same:
-        why = "What describes it, its law or the fit has changed since, so that it is as it came"
+        why = "Its RIG.toml, its law or the fit has changed since, so that it starts as it came"
         return came, LastUse(sentence=f"{last}. {why}; the screen Identify offers this again.", offer=offer)
     try:
         rig = fits.described_again(fit)
