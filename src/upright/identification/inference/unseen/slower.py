@@ -14,12 +14,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.inference.covariance import Optimum, assess
+from upright.identification.inference.covariance import Optimum
 from upright.identification.inference.unseen.reach import FURTHER
 from upright.identification.model.bands import SlowFriction
 from upright.identification.model.grey_box import GreyBox, Parameter, neutral
 from upright.identification.model.runs import Run
-from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.normal_equations import finite, pseudo_inverse
+from upright.identification.problem.residuals import Problem
 from upright.identification.problem.unknowns import shared_unknowns
 from upright.physics.equations import DryJoint
 from upright.signals.smoothing import dominant_period, savitzky_golay, smoothing_width
@@ -50,12 +51,12 @@ def considered(best: Optimum, shared: Sequence[int]) -> tuple[SlowFriction, ...]
         wider = replace(problem, rig=rig, unknowns=[*problem.unknowns, number], steps=np.append(problem.steps, 1e-6))
         z = np.append(best.x, number.coordinate(stiction.value))
         wider.settle_steps(z)
-        there = assess(wider, z)
-        if there.lost:
+        matrix = _matrix(wider, z)
+        if not finite(matrix):
             continue
         together = np.eye(z.size)  # stiction goes with sliding friction, and what is considered is how it differs
         together[-1, [u.name == joint.coulomb for u in wider.unknowns]] = 1.0
-        matrix, free = together.T @ there.matrix @ together, np.append(~best.pinned, False)
+        matrix, free = together.T @ matrix @ together, np.append(~best.pinned, False)
         follow = np.zeros(z.size)
         follow[free] = -pseudo_inverse(matrix[np.ix_(free, free)]) @ matrix[free, -1]
         natural = np.array([v if u.log else 1.0 for u, v in zip(wider.unknowns, wider.value(z), strict=True)])
@@ -63,6 +64,19 @@ def considered(best: Optimum, shared: Sequence[int]) -> tuple[SlowFriction, ...]
             SlowFriction(coulomb=joint.coulomb, speed=speed, moves=(follow * natural / natural[-1])[list(shared)])
         )
     return tuple(slow)
+
+
+def _matrix(problem: Problem, x: Array) -> Array:
+    """Gauss-Newton matrix (sought, sought) from central differences, infinite where a run runs away."""
+    _, prior = problem.prior_rows(x)
+    A = prior.T @ prior
+    for index in range(len(problem.tracks)):
+        rows, sought = problem.rows(index, x, central=True), problem.sought_in(index)
+        if rows is None:
+            return np.full_like(A, np.inf)
+        J = rows[1].reshape(-1, sought.size)
+        A[np.ix_(sought, sought)] += J.T @ J
+    return A
 
 
 def slow_friction(
