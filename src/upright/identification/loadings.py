@@ -20,6 +20,7 @@ from upright.errors import BadInput, NotIdentifiable
 from upright.identification.model.fit import Estimate
 from upright.records import Record
 from upright.signals.free_swing import Decay, decay
+from upright.signals.steps import smallest_step
 
 Array = NDArray[np.float64]
 
@@ -82,8 +83,7 @@ def swings(
     """
     x = record[signal]
     if resolution is None:
-        steps = np.abs(np.diff(np.unique(x)))
-        resolution = float(steps.min()) if steps.size else 0.0
+        resolution = smallest_step(x)
     cuts = [0, record.t.size]
     if command:
         cuts = [0, *(np.flatnonzero(np.diff(record[command])) + 1).tolist(), record.t.size]

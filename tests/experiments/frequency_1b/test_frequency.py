@@ -63,7 +63,7 @@ def test_stepped_sines_in_a_log_are_told_apart_and_detected():
         parts.append(np.sin(omega * TICK * np.arange(count)))
         at.append(omega)
     u = np.concatenate(parts)
-    assert [w for *_, w in sines_in(np.arange(u.size) * TICK, u)] == pytest.approx(at, rel=1e-3)
+    assert [s.omega for s in sines_in(np.arange(u.size) * TICK, u)] == pytest.approx(at, rel=1e-3)
     found = response_of([log(u)], command="u", outputs=["y"])
     assert found.omega == pytest.approx(at, rel=1e-3)
     # settled to 2e-3, two of which may add up over a window

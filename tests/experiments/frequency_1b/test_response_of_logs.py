@@ -9,9 +9,10 @@ import pytest
 
 from upright.errors import BadInput, NotIdentifiable
 from upright.experiments.frequency_1b.chapter import log_chapter
-from upright.experiments.frequency_1b.run import LogRequest, _step, response_of_logs
+from upright.experiments.frequency_1b.run import LogRequest, response_of_logs
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Record
+from upright.signals.steps import smallest_step
 
 DT, LENGTH, PERIODS = 0.01, 1000, 5
 LINES = np.array([3, 7, 15, 31, 63])
@@ -149,7 +150,7 @@ def test_logs_of_different_periods_are_refused(tmp_path):
 
 @pytest.mark.parametrize(("column", "step"), [([0.0, 0.5, 2.0, 0.5], 0.5), ([3.0, 3.0, 3.0], 0.0), ([1.0, -1.0], 2.0)])
 def test_the_smallest_step_of_a_column_is_its_resolution_and_one_that_never_moves_has_none(column, step):
-    assert _step(np.array(column)) == step
+    assert smallest_step(np.array(column)) == step
 
 
 STUDY = """

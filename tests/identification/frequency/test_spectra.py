@@ -38,22 +38,26 @@ def test_three_periods_are_a_sine(periods: int, stretches: int) -> None:
     u = np.where((t >= 0.1) & (t < 0.1 + 0.25 * periods), np.sin(omega * (t - 0.1)), 0.0)
     found = sines_in(t, u)
     assert len(found) == stretches
-    for a, b, w in found:
-        assert (a, b) == (pytest.approx(350, abs=1), pytest.approx(100 + 250 * periods, abs=1))
-        assert w == pytest.approx(omega, rel=2e-3)
+    for sine in found:
+        assert (sine.first, sine.last) == (pytest.approx(350, abs=1), pytest.approx(100 + 250 * periods, abs=1))
+        assert sine.omega == pytest.approx(omega, rel=2e-3)
 
 
 def test_sines_one_after_the_other_are_told_apart_and_a_ripple_is_no_period() -> None:
     t = DT * np.arange(6000)
     slow, fast = 2 * math.pi * 4, 2 * math.pi * 10
     u = 1.5 + np.where(t < 3, np.sin(slow * t), np.sin(fast * t))
-    (a, b, w), (c, d, v) = sines_in(t, u)
-    assert (w, v) == (pytest.approx(slow, rel=1e-3), pytest.approx(fast, rel=1e-3))
-    assert (a, d) == (pytest.approx(250, abs=2), pytest.approx(5900, abs=2))
-    assert b <= 3001 <= c + 100
+    first, second = sines_in(t, u)
+    assert (first.omega, second.omega) == (pytest.approx(slow, rel=1e-3), pytest.approx(fast, rel=1e-3))
+    assert (first.first, second.last) == (pytest.approx(250, abs=2), pytest.approx(5900, abs=2))
+    assert first.last <= 3001 <= second.first + 100
     rippled = np.sin(slow * t) + 0.05 * np.sin(40 * slow * t) * (np.cos(slow * t) < 0)
-    ((a, b, w),) = sines_in(t, rippled)
-    assert (a, b, w) == (pytest.approx(250, abs=2), pytest.approx(5750, abs=2), pytest.approx(slow, rel=1e-3))
+    (sine,) = sines_in(t, rippled)
+    assert (sine.first, sine.last, sine.omega) == (
+        pytest.approx(250, abs=2),
+        pytest.approx(5750, abs=2),
+        pytest.approx(slow, rel=1e-3),
+    )
     assert sines_in(t, np.sin(slow * t) * (t > 5.7)) == []
 
 

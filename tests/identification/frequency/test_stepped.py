@@ -142,4 +142,4 @@ def test_a_sweep_holds_no_sines_however_slow(low: float, high: float, seconds: f
 def test_a_small_fast_sine_after_a_large_slow_one_is_no_noise() -> None:
     omega = np.array([1.0, 10.0, 100.0])
     u = command(omega, periods=8, size=1 / omega)
-    assert [w for *_, w in sines_in(DT * np.arange(u.size), u)] == pytest.approx(omega, rel=1e-4)
+    assert [s.omega for s in sines_in(DT * np.arange(u.size), u)] == pytest.approx(omega, rel=1e-4)

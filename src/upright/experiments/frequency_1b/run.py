@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from upright import units
 from upright.errors import BadInput, nearest
@@ -33,6 +32,7 @@ from upright.records import Record
 from upright.rig import Rig
 from upright.rig.hardware import Hardware
 from upright.rig.makes import Make, hardware_of_make, make_named, make_of, make_rig
+from upright.signals.steps import smallest_step
 from upright.study.load import load_study
 from upright.study.results import write_response_fit
 
@@ -315,7 +315,7 @@ def _logs(sources: Sequence[Path], request: LogRequest) -> FrequencyResponse:
         if name not in signals:
             raise BadInput(f"--counts names '{name}', which is no output; {nearest(name, signals)}")
     scaled = [_scaled(r, command, signals, request) for r in records]
-    resolution = [_step(scaled[0][n]) for n in signals]
+    resolution = [smallest_step(scaled[0][n]) for n in signals]
     return response_of(scaled, command=command, outputs=list(signals), kind=request.kind, hold=request.hold,
                        resolution=resolution, band=request.band)  # fmt: skip
 
@@ -348,9 +348,3 @@ def _scaled(record: Record, command: str, signals: Mapping[str, str], request: L
             columns[name], si_units[name] = record[column], unit
     return Record(t=record.t, signals=columns, units=si_units, inputs=(command,), outputs=tuple(signals),
                   provenance=record.provenance)  # fmt: skip
-
-
-def _step(x: NDArray[np.float64]) -> float:
-    """Smallest step of a column."""
-    steps = np.diff(np.unique(x))
-    return float(steps.min()) if steps.size else 0.0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, NotIdentifiable
 from upright.identification.frequency.detection import settled
 from upright.identification.frequency.response import FrequencyResponse, describing
-from upright.identification.frequency.stepped import covered, stepped_response
+from upright.identification.frequency.stepped import covered, stepped_response, units_of
 from upright.records import Record
 
 Array = NDArray[np.float64]
@@ -82,10 +82,6 @@ def response_of(
     return response
 
 
-def _units(record: Record, outputs: Sequence[str], command: str) -> tuple[str, ...]:
-    return tuple(record.units.get(n, "") for n in (*outputs, command))
-
-
 def _sweep(
     records: Sequence[Record], command: str, outputs: Sequence[str], quanta: Array, hold: float
 ) -> FrequencyResponse:
@@ -137,7 +133,7 @@ def _sweep(
     drive = np.array([levels[int(np.argmax(np.abs(U[:, k])))] for k in at])
     variance = variance[at] + quanta**2 / 3 / length / drive[:, None] ** 2
     return FrequencyResponse(
-        omega=omega[at], response=G[at], outputs=tuple(outputs), units=_units(records[0], outputs, command),
+        omega=omega[at], response=G[at], outputs=tuple(outputs), units=units_of(records[0], outputs, command),
         input=command, variance=variance, coherence=coherence[at], drive=drive.astype(np.complex128),
         dry=describing(omega[at], np.abs(G[at]) * drive[:, None]), hold=hold,
         notes=(f"{U.shape[0]} windows of {length * records[0].period:.3g} s.",),
@@ -248,7 +244,7 @@ def multisine_response(
     dry, still = _friction(mean, lines, length, period)
     return FrequencyResponse(
         omega=omega, response=mean[lines] / drive[:, None], outputs=tuple(outputs),
-        units=_units(first, outputs, command), input=command,
+        units=units_of(first, outputs, command), input=command,
         variance=np.maximum(scatter / count, rounding) / np.abs(drive[:, None]) ** 2,
         coherence=cross / np.maximum(both, 1e-300), distortion=_between(mean, lines), drive=drive, dry=dry, still=still,
         together=True, hold=hold,

@@ -21,6 +21,7 @@ from upright.errors import NotIdentifiable
 from upright.identification.frequency.detection import PER_PERIOD, Tone, detect, overtones, settled
 from upright.identification.frequency.response import FrequencyResponse
 from upright.records import Record
+from upright.signals.steps import smallest_step
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -59,13 +60,20 @@ class HeldSine:
         """Mean [s]."""
         return float(self.crossings[-1] - self.crossings[0]) / (self.crossings.size - 1)
 
+    @property
+    def samples(self) -> float:
+        """Of a period, in the mean."""
+        return (self.last - self.first) / (self.crossings.size - 1)
 
-def sines_in(t: Array, u: Array) -> list[tuple[int, int, float]]:
-    """Stretches (first, last, omega) of a command that are one sine each, three periods or more.
 
-    From the first upward crossing to the last, so that a sine that follows a pause loses its first period.
+def sines_in(t: Array, u: Array) -> list[HeldSine]:
+    """Sines of a command, three periods or more of each, from its first upward crossing to its last.
+
+    By its crossings without those that are noise, or by all if they explain clearly more of it: a small and fast sine
+    that follows a large and slow one passes for noise. A sine that follows a pause loses its first period.
     """
-    return [(s.first, s.last, s.omega) for s in _stretches(t, u)]
+    merged, every = (_between(t, u, *_crossings(t, u, merged)) for merged in (True, False))
+    return every if _lasts(every) > 1.1 * _lasts(merged) else merged
 
 
 def covered(t: Array, u: Array) -> float:
@@ -73,13 +81,13 @@ def covered(t: Array, u: Array) -> float:
 
     0 for a sweep whose frequency grows within each stretch as much as from one to the next.
     """
-    stretches = _stretches(t, u)
+    stretches = sines_in(t, u)
     if not stretches or _swept(stretches):
         return 0.0
     ends = np.array([0, *(k for s in stretches for k in (s.first, s.last)), t.size])
     gaps = (ends[1::2] - ends[0::2]).astype(np.float64)
     inside = float(t.size - gaps.sum())
-    periods = np.array([(s.last - s.first) / (s.crossings.size - 1) for s in stretches])
+    periods = np.array([s.samples for s in stretches])
     near = np.maximum([periods[0], *periods], [*periods, periods[-1]])
     moves = np.array([_moves(u[a:b], float(np.ptp(u))) for a, b in zip(ends[0::2], ends[1::2], strict=True)])
     return inside / (inside + float(np.where(moves, gaps, np.minimum(gaps, near)).sum()))
@@ -104,9 +112,9 @@ def stepped_response(
     fast: list[float] = []
     for r in records:
         y, u = np.column_stack([r[n] for n in outputs]), r[command]
-        step = _step(u)
-        for stretch in _stretches(r.t, u):
-            if (stretch.last - stretch.first) / (stretch.crossings.size - 1) < PER_PERIOD + 0.5:
+        step = smallest_step(u)
+        for stretch in sines_in(r.t, u):
+            if stretch.samples < PER_PERIOD + 0.5:
                 fast.append(stretch.omega)
             else:
                 points.append(_point(r.t, y, u, stretch, quanta, step))
@@ -119,11 +127,16 @@ def stepped_response(
             distinct.append(p)
         elif float(p.y.variance.sum()) < float(distinct[-1].y.variance.sum()):
             distinct[-1] = p
-    units = tuple(records[0].units.get(n, "") for n in (*outputs, command))
     return from_tones(
-        [p.y for p in distinct], [p.u for p in distinct], outputs=outputs, units=units, command=command, hold=hold,
+        [p.y for p in distinct], [p.u for p in distinct], outputs=outputs,
+        units=units_of(records[0], outputs, command), command=command, hold=hold,
         notes=_notes(distinct, fast),
     )  # fmt: skip
+
+
+def units_of(record: Record, outputs: Sequence[str], command: str) -> tuple[str, ...]:
+    """Units of the outputs, then of the command; empty where the log has none."""
+    return tuple(record.units.get(n, "") for n in (*outputs, command))
 
 
 def from_tones(
@@ -305,22 +318,13 @@ def _merged(edges: NDArray[np.int64], size: Array) -> NDArray[np.int64]:
     return np.concatenate([edges[:-1][np.array(kept)], edges[-1:]])
 
 
-def _stretches(t: Array, u: Array) -> list[HeldSine]:
-    """Sines of a command by its crossings without those that are noise, or by all if they explain clearly more of it.
-
-    A small and fast sine that follows a large and slow one passes for noise.
-    """
-    merged, every = (_between(t, u, *_crossings(t, u, merged)) for merged in (True, False))
-    return every if _lasts(every) > 1.1 * _lasts(merged) else merged
-
-
 def _lasts(stretches: Sequence[HeldSine]) -> float:
     return sum(float(s.crossings[-1] - s.crossings[0]) for s in stretches)
 
 
 def _between(t: Array, u: Array, at: NDArray[np.int64], times: Array) -> list[HeldSine]:
     out: list[HeldSine] = []
-    tick, step = float(t[1] - t[0]), _step(u)
+    tick, step = float(t[1] - t[0]), smallest_step(u)
     i = 0
     while i < times.size - 2:
         j = i + 1
@@ -403,9 +407,3 @@ def _swept(stretches: Sequence[HeldSine]) -> bool:
         if (step := b.period - a.period) and b.crossings[0] - a.crossings[-1] < 1.5 * max(a.period, b.period):
             shares.append(own / step)
     return len(shares) > 1 and len(shares) > len(stretches) / 3 and float(np.median(shares)) > DRIFTS
-
-
-def _step(x: Array) -> float:
-    """Smallest step of a column."""
-    steps = np.diff(np.unique(x))
-    return float(steps.min()) if steps.size else 0.0

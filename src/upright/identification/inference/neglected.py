@@ -29,7 +29,6 @@ from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import NOISE, Parameter, neutral
 from upright.identification.problem.normal_equations import pseudo_inverse
 from upright.identification.problem.residuals import formulate
-from upright.identification.problem.unknowns import shared_unknowns
 from upright.identification.search.descent import descend
 from upright.identification.search.starts import viscous_terms
 
@@ -58,9 +57,8 @@ def consider(
     `farthest` is the largest value with which the fit begins.
     """
     problem = best.problem
-    (number,) = shared_unknowns(replace(problem.rig, parameters={parameter.name: parameter}))
-    rig = replace(problem.rig, parameters={**problem.rig.parameters, parameter.name: parameter})
-    wider = replace(problem, rig=rig, unknowns=[*problem.unknowns, number], steps=np.append(problem.steps, 1e-6))
+    wider = problem.beside(parameter)
+    number = wider.unknowns[-1]
     z = np.append(best.x, 0.0)
     here = wider.settle_steps(z)
     free = np.append(~best.pinned, False)

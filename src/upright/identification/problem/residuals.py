@@ -17,7 +17,7 @@ from threading import get_ident
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.identification.model.grey_box import GreyBox, base_values, neutral
+from upright.identification.model.grey_box import GreyBox, Parameter, base_values, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import VECTOR, Normal, finite, products, slopes, squares
 from upright.identification.problem.restarts import PERTURBATION, Restart, settle
@@ -109,6 +109,13 @@ class Problem:
     def sought_in(self, index: int) -> NDArray[np.int64]:
         """Places of the numbers that matter in one run."""
         return np.array([i for i, u in enumerate(self.unknowns) if u.shared or index in u.runs], dtype=np.int64)
+
+    def beside(self, sought: Parameter, *stated: Parameter) -> Problem:
+        """The problem with one number more, its last, and what else its rig then has."""
+        (number,) = shared_unknowns(replace(self.rig, parameters={sought.name: sought}))
+        more = {p.name: p for p in (sought, *stated)}
+        rig = replace(self.rig, parameters={**self.rig.parameters, **more})
+        return replace(self, rig=rig, unknowns=[*self.unknowns, number], steps=np.append(self.steps, 1e-6))
 
     def value(self, x: Array) -> Array:
         """Values (sought,) or (sought, lanes) of coordinates."""

@@ -21,7 +21,6 @@ from upright.identification.model.grey_box import GreyBox, Parameter, neutral
 from upright.identification.model.runs import Run
 from upright.identification.problem.normal_equations import finite, pseudo_inverse
 from upright.identification.problem.residuals import Problem
-from upright.identification.problem.unknowns import shared_unknowns
 from upright.physics.equations import DryJoint
 from upright.signals.smoothing import dominant_period, savitzky_golay, smoothing_width
 
@@ -46,10 +45,8 @@ def considered(best: Optimum, shared: Sequence[int]) -> tuple[SlowFriction, ...]
         if not known[joint.coulomb].value > 0:
             continue
         stiction, fades = _beside(replace(problem.rig, parameters=known), joint, speed)
-        rig = replace(problem.rig, parameters={**problem.rig.parameters, stiction.name: stiction, fades.name: fades})
-        (number,) = shared_unknowns(replace(problem.rig, parameters={stiction.name: stiction}))
-        wider = replace(problem, rig=rig, unknowns=[*problem.unknowns, number], steps=np.append(problem.steps, 1e-6))
-        z = np.append(best.x, number.coordinate(stiction.value))
+        wider = problem.beside(stiction, fades)
+        z = np.append(best.x, wider.unknowns[-1].coordinate(stiction.value))
         wider.settle_steps(z)
         matrix = _matrix(wider, z)
         if not finite(matrix):

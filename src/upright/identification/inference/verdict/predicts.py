@@ -32,7 +32,7 @@ FEWEST = 70.0
 """Percent of a signal inside its band below which a prediction falls short of 90 %.
 
 What is left over comes in waves, so that of one run fewer than promised lie inside by chance: of twins with physics
-that their models lack one signal in eleven had fewer than this (`python -m benchmarks bands`).
+that their models lack one signal in eighteen had fewer than this (`python -m benchmarks bands`).
 """
 
 
