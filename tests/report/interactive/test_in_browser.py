@@ -32,15 +32,22 @@ def written(fit, tmp_path_factory):
     return write_html(tmp_path_factory.mktemp("traces") / "report.html", chapter(fit))
 
 
+def traces(place=0):
+    """Those of a figure: which figure answers first is the browser's choice."""
+    return f"TRACES.find((t) => t.figure === {SEEN}[{place}])"
+
+
 def show(page, place=0):
+    """Scroll to a figure and wait for its plots; where they are on the page."""
     page.evaluate(f"{SEEN}[{place}].scrollIntoView()")
-    until(page, f"TRACES.length > {place} && TRACES[{place}].plots[0].bbox.width > 0")
+    until(page, f"{traces(place)}?.plots[0].bbox.width > 0")
+    return page.locator("figure:has(script.traces)").nth(place)
 
 
 def told(page, place=0):
     """Time and values that stand at the cursor, by name."""
     text = page.evaluate(
-        f"(() => {{ const t = TRACES[{place}]; return [t.time.textContent,"
+        f"(() => {{ const t = {traces(place)}; return [t.time.textContent,"
         " t.heads.map(({ line, value }) => [line.name, value.textContent])]; })()"
     )
     number = lambda s: float(s.replace("\u2212", "-"))  # noqa: E731
@@ -50,8 +57,7 @@ def told(page, place=0):
 def test_the_cursor_tells_what_the_record_holds_at_that_time(written, fit):
     run = fit.runs["release"]
     with opened(written) as (page, wrong):
-        show(page, RELEASE)
-        over = page.locator(".u-over").nth(6)  # theta: each run has four panels
+        over = show(page, RELEASE).locator(".u-over").nth(2)  # theta
         box = over.bounding_box()
         for share in (0.2, 0.47, 0.9):
             page.mouse.move(box["x"] + share * box["width"], box["y"] + 20)
@@ -68,52 +74,52 @@ def test_the_cursor_tells_what_the_record_holds_at_that_time(written, fit):
 
 
 def test_a_drag_zooms_every_panel_to_the_same_seconds_and_a_double_click_shows_all(written):
-    axes = "TRACES[0].plots.map((u) => [u.scales.x.min, u.scales.x.max])"
+    plots = f"{traces()}.plots"
+    axes = f"{plots}.map((u) => [u.scales.x.min, u.scales.x.max])"
     with opened(written) as (page, wrong):
-        show(page)
+        figure = show(page)
         assert page.evaluate(axes) == [[0, 10]] * 4
-        box = page.locator(".u-over").first.bounding_box()
+        box = figure.locator(".u-over").first.bounding_box()
         page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 50)
         page.mouse.down()
         page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 55, steps=4)
         page.mouse.up()
-        until(page, "TRACES[0].plots.every((u) => u.scales.x.max < 6)")
+        until(page, f"{plots}.every((u) => u.scales.x.max < 6)")
         for low, high in page.evaluate(axes):
             assert (low, high) == (pytest.approx(3.0, abs=0.05), pytest.approx(5.0, abs=0.05))
         page.mouse.dblclick(box["x"] + 60, box["y"] + 50)
-        until(page, "TRACES[0].plots.every((u) => u.scales.x.max === 10)")
+        until(page, f"{plots}.every((u) => u.scales.x.max === 10)")
         assert wrong == []
 
 
 def test_keys_move_the_cursor_sample_by_sample_and_zoom(written, fit):
-    run = fit.runs["release"]
+    run, shown = fit.runs["release"], traces(RELEASE)
     with opened(written) as (page, wrong):
-        show(page, RELEASE)
-        page.locator(".panels").nth(RELEASE).focus()
+        figure = show(page, RELEASE)
+        figure.locator(".panels").focus()
         for _ in range(4):
             page.keyboard.press("ArrowRight")
-        until(page, "TRACES[1].heard.textContent !== ''")
+        until(page, f"{shown}.heard.textContent !== ''")
         t, lines = told(page, RELEASE)
         assert t == pytest.approx(run.t[3], abs=1e-4)
         assert lines[0][1] == pytest.approx(run.y[3, 0], abs=1e-4)
-        assert (
-            page.locator(".heard").nth(RELEASE).inner_text().startswith(f"time {float(f'{run.t[3]:.5g}')} s: measured")
-        )
+        heard = figure.locator(".heard").inner_text()
+        assert heard.startswith(f"time {float(f'{run.t[3]:.5g}')} s: measured")
         page.keyboard.press("Shift+ArrowRight")
-        until(page, "TRACES[1].index === 13")
+        until(page, f"{shown}.index === 13")
         page.keyboard.press("+")
-        until(page, "TRACES[1].plots.every((u) => u.scales.x.max - u.scales.x.min < 5.01)")
+        until(page, f"{shown}.plots.every((u) => u.scales.x.max - u.scales.x.min < 5.01)")
         page.keyboard.press("Home")
-        until(page, "TRACES[1].plots.every((u) => u.scales.x.max - u.scales.x.min > 9.99)")
+        until(page, f"{shown}.plots.every((u) => u.scales.x.max - u.scales.x.min > 9.99)")
         assert wrong == []
 
 
 def test_the_band_of_a_prediction_is_drawn_about_its_model(written, fit):
     with opened(written) as (page, wrong):
         show(page, TAIL)
-        drawn = page.evaluate("TRACES[0].plots.map((u) => u.bands.length)")
+        drawn = page.evaluate(f"{traces(TAIL)}.plots.map((u) => u.bands.length)")
         assert drawn == [0, 0, 1, 1]  # psi has none
-        edges = np.array(page.evaluate("TRACES[0].plots[2].data.slice(1, 3)"))
+        edges = np.array(page.evaluate(f"{traces(TAIL)}.plots[2].data.slice(1, 3)"))
         np.testing.assert_allclose(edges[0] - edges[1], 0.04, atol=1e-4)
         np.testing.assert_allclose(edges.mean(axis=0), fit.runs["tail"].simulated[:, 1], atol=1e-4)
         assert wrong == []
@@ -122,7 +128,7 @@ def test_the_band_of_a_prediction_is_drawn_about_its_model(written, fit):
 def test_a_prediction_that_was_restarted_is_broken_there(written):
     with opened(written) as (page, _):
         show(page, RESTARTED)
-        gaps = page.evaluate("TRACES[2].gaps(TRACES[2].plots[0], 1, 0, TRACES[2].t.length - 1).length")
+        gaps = page.evaluate(f"(t => t.gaps(t.plots[0], 1, 0, t.t.length - 1).length)({traces(RESTARTED)})")
         assert gaps == 20  # 10 s in windows of 0.5 s, the last sample begins one
 
 
