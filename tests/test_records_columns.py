@@ -39,7 +39,8 @@ def test_units_of_places_are_worth_what_pint_says(unit):
     [
         ("theta [rad]", "rad"), ("u (V)", "V"), ("a [b] [deg]", "deg"), ("x [ mm ] ", "mm"), ("x [bogus]", ""),
         ("x", ""), ("Pendel (\u00b0)", "deg"), ("arm [degrees]", "deg"), ("angle [Radians]", "rad"),
-        ("x [V] raw", ""), ("k" * 300 + " [V]", "V"),
+        ("x [V] raw", ""), ("k" * 300 + " [V]", "V"), ("Angle (deg, 0 = up)", "deg"), ("a (degrees; raw)", "deg"),
+        ("a [m/s^2, filtered]", "m/s^2"), ("probe (1,5 V)", ""), ("a (left, right)", ""), ("a [, V]", ""),
     ],
 )  # fmt: skip
 def test_a_unit_stands_in_brackets_behind_a_name(name, unit):

@@ -34,7 +34,7 @@ def time_scale(name: str) -> float:
 
     ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"``, ``"t_us"``, ``"ms"`` and Arduino's ``"millis"`` are.
     """
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*[\])])?\s*", name[:_LONGEST].casefold())
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*(?:[,;][^\[\]()]*)?[\])])?\s*", name[:_LONGEST].casefold())
     stem, unit = (match[1], match[2] or "") if match else ("", "")
     if stem in TIME_NAMES:
         return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
@@ -50,13 +50,17 @@ def stated_time_unit(name: str) -> float:
 
 
 def stated_unit(name: str) -> str:
-    """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read."""
+    """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read.
+
+    What follows it after a comma is a remark, as in ``theta [deg, 0 = up]``.
+    """
     match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name[-_LONGEST:])
     if match is None:
         return ""
     from upright.units import known
 
-    unit = _SPELLED.get(match[1].casefold(), match[1])
+    unit = match[1] if re.match(r"\d", match[1]) else re.split(r"\s*[,;]", match[1])[0]
+    unit = _SPELLED.get(unit.casefold(), unit)
     return unit if known(unit) else ""
 
 
