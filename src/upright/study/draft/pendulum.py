@@ -125,7 +125,7 @@ def pendulum_tables(
     return recognised, [
         *tables,
         _defaults(recognised, plant, balanced),
-        *_runs(record, recognised, file, label, balanced=balanced is not None),
+        *_runs(record, recognised, file, label),
     ]
 
 
@@ -344,7 +344,7 @@ def _defaults(recognised: Recognised, plant: type[Plant], balanced: Balanced | N
     return table
 
 
-def _runs(record: Record, recognised: Recognised, file: str, label: str, *, balanced: bool) -> list[TomlTable]:
+def _runs(record: Record, recognised: Recognised, file: str, label: str) -> list[TomlTable]:
     """One run; of a long one, free or driven, the tail is kept for prediction, and of several swings the last one."""
     start, stop = recognised.window
     if recognised.earlier:
@@ -354,7 +354,7 @@ def _runs(record: Record, recognised: Recognised, file: str, label: str, *, bala
     if recognised.drive is None and recognised.frequency * (stop - start) / (2 * np.pi) > 12:
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
     split = start + FITTED_SHARE * (stop - start)
-    if not balanced and _acts_in_both(record, recognised, split):
+    if _acts_in_both(record, recognised, split):
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
     return run_tables(file, [(label, start, stop, "fit")])
 
