@@ -12,6 +12,9 @@ from upright.identification.model.fit import Judgement, RunScore
 GOOD = 80.0
 """Fit percent below which a run counts as not explained."""
 
+OWN = math.sqrt((100 - GOOD) ** 2 - (100 - ENOUGH) ** 2)
+"""Percent of a signal that a model may miss by itself where the start state allows `ENOUGH`: `GOOD` is then reached."""
+
 DROP = 15.0
 """Percent by which a predicted signal may fall behind the worst fitted one of the same name."""
 
@@ -46,17 +49,18 @@ def predicts(evidence: Evidence) -> Judgement:
     elif not evidence.converged and not evidence.lost:
         against.append("The search had not settled when its evaluations ran out.")
     fitted, predicted = (_percents(evidence.runs, role) for role in ("fit", "predict"))
-    poor = [f"{what} {p:.1f} %" for what, p in fitted.items() if p < GOOD]
+    least = _least(evidence.runs)
+    poor = {what: p for what, p in fitted.items() if p < least[what]}
     if poor:
-        against.append(f"The fitted runs are not explained ({', '.join(poor)}; {GOOD:.0f} % is the least).")
+        against.append(f"The fitted runs are not explained ({_below(poor, least)}).")
     still = _nearly_still(evidence.runs)
     spared = {*still, *_foretold(evidence.runs)}
     worse = [f"{what} {p:.1f} %" for what, p in _worse(evidence.runs).items() if what not in spared]
     if worse:
         against.append(f"Runs that were not fitted are predicted much worse than fitted ones ({', '.join(worse)}).")
-    bad = [f"{what} {p:.1f} %" for what, p in predicted.items() if p < GOOD and what not in spared]
+    bad = {what: p for what, p in predicted.items() if p < least[what] and what not in spared}
     if bad and not worse:
-        against.append(f"Runs that were not fitted are not predicted ({', '.join(bad)}; {GOOD:.0f} % is the least).")
+        against.append(f"Runs that were not fitted are not predicted ({_below(bad, least)}).")
     against += [s[0].upper() + s[1:] for s in evidence.conventions]
     blank = uninformative(evidence.runs)
     explains = f"It explains {_ranges(evidence.runs, 'fit')} of the fitted runs. " if fitted else ""
@@ -78,7 +82,7 @@ def predicts(evidence: Evidence) -> Judgement:
         )
     if against:
         return Judgement(
-            question=PREDICTS, answer="no", headline=f"{explains}Do not rely on this model yet.",
+            question=PREDICTS, answer="no", headline=f"{explains}It is not shown to predict.",
             reasons=(*against, *notes),
         )  # fmt: skip
     if not predicted:
@@ -94,18 +98,19 @@ def predicts(evidence: Evidence) -> Judgement:
             f"Its 90 % bands were too narrow: they hold only {', '.join(narrow)} of the samples ({FEWEST:.0f} % is the "
             "least), so expect to be further off than the fit says."
         )
-    vague = [f"{what} {p:.0f} %" for what, p in _expected(evidence.runs).items() if p < GOOD]
+    vague = {what: p for what, p in _expected(evidence.runs).items() if p < least.get(what, GOOD)}
     if vague and not still:
         notes.append(
-            f"The numbers are so uncertain that no more can be expected of such runs ({', '.join(vague)}; {GOOD:.0f} % "
-            "is the least), however well these were met: fit longer ones, or with more in them."
+            f"The numbers are so uncertain that no more can be expected of such runs ({_below(vague, least)}), however "
+            "well these were met: fit longer ones, or with more in them."
         )
     if still:
         notes.append(
             f"Too little moved to test the model: {', '.join(still)} went at most {STILL:g} times as far as in the "
             f"fitted runs, and was missed by less than {100 - GOOD:.0f} % of that. Hold a run out that moves more."
         )
-    part = "in part" if blank or narrow or vague or still or evidence.missing else "yes"
+    near = evidence.judged is not None and not _tested(evidence.judged, evidence.runs)
+    part = "in part" if blank or narrow or vague or still or near or evidence.missing else "yes"
     far = f" Outside what the fit has seen: {', '.join(outside)}." if outside else ""
     headline = (
         f"{explains}It predicts {_ranges(evidence.runs, 'predict', still)} of runs it has not seen"
@@ -120,6 +125,40 @@ def predicts(evidence: Evidence) -> Judgement:
     return Judgement(question=PREDICTS, answer=part, headline=headline, reasons=tuple(notes))
 
 
+def _least(runs: Mapping[str, RunScore]) -> dict[str, float]:
+    """Fit percents that count as explained: less than `GOOD` by what a start state costs beyond what `ENOUGH` allows.
+
+    What the model misses by itself and what the start state leaves unknown have nothing to do with one another, so
+    their variances add up.
+    """
+    return {
+        f"{label} {signal}": GOOD if allowed >= ENOUGH else max(HALF, 100 - math.hypot(OWN, 100 - allowed))
+        for label, s in runs.items()
+        for signal in s.fit_percent
+        for allowed in [_allowed(s).get(signal, 100.0)]
+    }
+
+
+def _allowed(s: RunScore) -> Mapping[str, float]:
+    """Fit percents that the start state allows as far ahead as a run is judged."""
+    return {} if s.horizon is None else s.ceiling.get(s.horizon, {})
+
+
+def _below(percents: Mapping[str, float], least: Mapping[str, float]) -> str:
+    """What falls short, and of what."""
+    kinds: dict[str, list[str]] = {}
+    for what, p in percents.items():
+        kinds.setdefault(f"{least.get(what, GOOD):.0f}", []).append(f"{what} {p:.1f} %")
+    return "; ".join(f"{', '.join(those)}; {of} % is the least" for of, those in kinds.items())
+
+
+def _tested(judged: Judged, runs: Mapping[str, RunScore]) -> bool:
+    """Whether the start state allows enough of every fitted signal as far ahead as it is judged."""
+    return all(
+        p >= ENOUGH for s in runs.values() if s.role == "fit" for p in s.ceiling.get(judged.seconds, {}).values()
+    )
+
+
 def _horizon(judged: Judged, runs: Mapping[str, RunScore]) -> list[str]:
     """Why runs are judged so far ahead, and what the start state alone leaves further on."""
     allowed: dict[float, list[float]] = {}
@@ -130,22 +169,34 @@ def _horizon(judged: Judged, runs: Mapping[str, RunScore]) -> list[str]:
             reached.setdefault(horizon, []).extend(s.ahead[horizon].values())
     if not allowed:
         return []
-    least = min(allowed[judged.seconds], default=ENOUGH)
     ms = _seconds(judged.seconds)
     falls = "" if not judged.growth else f": the plant falls by e in {1e3 / judged.growth:.2g} ms"
-    if least < ENOUGH:
+    if not _tested(judged, runs):
         return [
             f"No horizon tests this model{falls}, and already {ms} ahead the start state, known no better than the "
-            f"sensors allow, limits any model to {least:.0f} %. Let it move more, or measure it finer."
+            f"sensors allow, limits any model to {min(allowed[judged.seconds]):.0f} %. Let it move more, or measure it "
+            "finer."
         ]
+    little = ", ".join(
+        f"{label} {signal} {p:.0f} %"
+        for label, s in runs.items()
+        for signal, p in _allowed(s).items()
+        if p < ENOUGH and s.role == "predict"
+    )
+    notes: list[str] = []
+    if little:
+        notes.append(
+            f"Less moved in runs that were not fitted, and {ms} ahead the start state, known no better than the "
+            f"sensors allow, limits any model there ({little}): they are judged by what is missed beyond."
+        )
     further = [h for h in allowed if h > judged.seconds * (1 + 1e-9)]
-    if not further:
-        return []
-    h = max(further)
-    return [
-        f"It is judged {ms} ahead{falls}, and further on any model misses by what its start state is unknown: at "
-        f"{_seconds(h)} that allows {min(allowed[h]):.0f} %, and {min(reached[h]):.0f} % are reached."
-    ]
+    if further:
+        h = max(further)
+        notes.append(
+            f"It is judged {ms} ahead{falls}, and further on any model misses by what its start state is unknown: at "
+            f"{_seconds(h)} that allows {min(allowed[h]):.0f} %, and {min(reached[h]):.0f} % are reached."
+        )
+    return notes
 
 
 def _too_narrow(runs: Mapping[str, RunScore]) -> list[str]:
@@ -249,6 +300,7 @@ def _seconds(horizon: float) -> str:
 def _worse(runs: Mapping[str, RunScore]) -> dict[str, float]:
     """Fit percents of predicted signals far behind the worst fitted one that was simulated as far ahead."""
     least: dict[tuple[str, float | None], float] = {}
+    enough = _least(runs)
     for s in runs.values():
         if s.role == "fit":
             for signal, percent in s.fit_percent.items():
@@ -259,7 +311,7 @@ def _worse(runs: Mapping[str, RunScore]) -> dict[str, float]:
         for label, s in runs.items()
         if s.role == "predict"
         for signal, percent in s.fit_percent.items()
-        if percent < least.get((signal, s.horizon), GOOD) - DROP and percent < GOOD
+        if percent < least.get((signal, s.horizon), GOOD) - DROP and percent < enough[f"{label} {signal}"]
     }
 
 
