@@ -19,13 +19,13 @@ from upright.rig.makes import make_rig
 NO = {
     "question": "Does it predict?",
     "answer": "no",
-    "headline": "It explains 39.4 % of the fitted runs. Do not rely on this model yet.",
+    "headline": "It explains 39.4 % of the fitted runs. It is not shown to predict.",
     "advice": "",
     "reasons": ["The fitted runs are not explained (swing theta 39.4 %; 80 % is the least)."],
 }
 UNTRUSTED = {"trusted": False, "answers": [NO], "verdict": "Does it predict? No. And so on, for a page."}
 TRUSTED = {"trusted": True, "verdict": "Does it predict? Yes."}
-SAID = "Does it predict? No. It explains 39.4 % of the fitted runs. Do not rely on this model yet. The fitted runs are"
+SAID = "Does it predict? No. It explains 39.4 % of the fitted runs. It is not shown to predict. The fitted runs are"
 REFUSED = "Do not rely on this: its model is not trusted."
 
 POLES = "-4.15+-1.63j, -16.9, -3.2"

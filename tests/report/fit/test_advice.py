@@ -44,8 +44,10 @@ def test_what_the_data_cannot_see_is_passed_on(fit):
     assert fit.unseen[0] in said(fit)
 
 
-def test_weak_numbers_are_to_be_measured(changed):
-    assert "measure one of them" in said(changed(unseen=()))
+def test_weak_numbers_are_to_be_measured(fit, changed):
+    assert "hardly see b_2: measure it on the bench" in said(changed(unseen=()))
+    more = {n: replace(fit.estimates["b_2"], status="poorly determined") for n in ("b_1", "b_2")}
+    assert "hardly see b_1, b_2: measure one of them" in said(changed(unseen=(), estimates={**fit.estimates, **more}))
 
 
 def test_a_stopped_search_is_to_be_ended(changed):

@@ -102,9 +102,10 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
     known = f"{', '.join(free)}.{narrow}"
     ratios = _ratios(evidence)
     if no:
-        answer, headline = "no", "Not all of them are determined."
+        answer, headline = "no", "Not all of its numbers are determined."
     elif guessed:
-        answer, headline = "in part", f"Only if the rig is the plant that was guessed.{_and(ratios)}"
+        answer = "in part"
+        headline = f"Its numbers can be used only if the rig is the plant that was guessed.{_and(ratios)}"
     elif evidence.bent and not free:
         answer, headline = "no", "No number can be used before the drive's delay is estimated."
     elif reasons:
