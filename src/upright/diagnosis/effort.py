@@ -253,21 +253,21 @@ def push_of(motion: SmoothedMotion, balance: ForceBalance | None) -> Push | None
     ends = [table.search(first, last, forward=False) for table in tables]
     best = simplest([min(costs.values()) for _, costs in ends])
     table, (end, costs) = tables[best], ends[best]
-    early = table.before(end)
+    (early,) = table.before(np.array([end]))
     late = table.whole - early
     after = 1.0
     if float(np.sum(late**2)) > 1e-9 * float(u @ u):
-        left, g = table.explain(np.hstack([early, late]))
+        left, g = table.explain(np.vstack([early, late]))
         after = float(g[1] / g[0]) if g[0] and left < 0.6 * costs[end] else 0.0
     speed = motion.v[driven][here]
     sliding = np.abs(speed) > 0.1 * float(np.abs(speed).max())
     return Push(
-        without=table.explain(early[:, :0])[0],
-        full=table.explain(table.whole)[0],
+        without=float(table.explain(early[:0])[0]),
+        full=float(table.explain(table.whole)[0]),
         cut=costs[end],
         end=float(motion.t[0] + (end - motion.samples[0]) * motion.dt),
         after=after,
-        late=float(np.sum(late[sliding] ** 2)) / float(u @ u),
+        late=float(np.sum(late[:, sliding] ** 2)) / float(u @ u),
         rest=table.rest,
         t=t,
         u=u,

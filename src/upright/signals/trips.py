@@ -38,6 +38,9 @@ SLOW = 0.2
 RESTS = 0.5
 """Seconds for which a body rests against a command that moved it before, when its drive is dead."""
 
+SHORT = 100
+"""A record with fewer samples tells of no trip."""
+
 LEAST = 30
 """Independent stretches (record over smoothing) that a record needs before it is judged."""
 
@@ -104,8 +107,8 @@ class TripRegression:
 
     @cached_property
     def whole(self) -> Array:
-        """`switched` (T, columns), smoothed."""
-        return _smoothed(self.switched, self.weights)[self.rows]
+        """`switched` (columns, T), smoothed."""
+        return np.ascontiguousarray(_smoothed(self.switched, self.weights)[self.rows].T)
 
     @cached_property
     def _basis(self) -> Array:
@@ -125,41 +128,44 @@ class TripRegression:
         return float(away @ away)
 
     def _aside(self, x: Array) -> Array:
-        return x - self._basis @ (self._basis.T @ x)
+        """What of rows (..., T) `base` does not explain."""
+        flat = x.reshape(-1, x.shape[-1])
+        return x - ((flat @ self._basis) @ self._basis.T).reshape(x.shape)
 
-    def before(self, m: int) -> Array:
-        """`switched` (T, columns) with zeros from sample `m` on, smoothed."""
+    def before(self, cuts: NDArray[np.int64]) -> Array:
+        """`switched` (cuts, columns, T) with zeros from each of the samples `cuts` on, smoothed."""
         half = self.weights.size // 2
-        out = np.where((self.rows < m)[:, None], self.whole, 0.0)
-        for i in np.flatnonzero(np.abs(self.rows - m) <= half):
-            here = self.rows[i]
-            inside = np.arange(here - half, here + half + 1) < m
-            out[i] = (self.weights * inside) @ self.switched[here - half : here + half + 1]
+        out = np.where(self.rows < cuts[:, None, None], self.whole, 0.0)
+        cut, row = np.nonzero(np.abs(self.rows - cuts[:, None]) <= half)
+        first = self.rows[row] - half
+        inside = first[:, None] + np.arange(self.weights.size) < cuts[cut, None]
+        windows = np.lib.stride_tricks.sliding_window_view(self.switched, self.weights.size, axis=0)
+        out[cut, :, row] = np.einsum("iw,icw->ic", self.weights * inside, windows[first])
         return out
 
-    def explain(self, columns: Array) -> tuple[float, Array]:
-        """Share of the variance that base and `columns` (T, p) leave unexplained, and the slopes (p,) of the latter."""
+    def explain(self, columns: Array) -> tuple[Array, Array]:
+        """Share of the variance that base and `columns` (..., p, T) leave unexplained, and slopes (..., p) of these."""
         alone = self._aside(columns)
-        size = np.linalg.norm(columns, axis=0)
-        acts = np.linalg.norm(alone, axis=0) > 1e-4 * size
-        slopes = np.zeros(size.size)
-        slopes[acts] = np.linalg.lstsq(alone[:, acts] / size[acts], self.rest, rcond=1e-5)[0] / size[acts]
-        left = self.rest - alone @ slopes
-        return float(left @ left) / self.variance, slopes
+        size = _length(columns)
+        acts = _length(alone) > 1e-4 * size
+        scale = np.where(acts, 1 / np.where(acts, size, 1.0), 0.0)
+        slopes = _slopes(alone * scale[..., None], self.rest) * scale
+        left = self.rest - (slopes[..., None, :] @ alone)[..., 0, :]
+        return np.einsum("...t,...t->...", left, left) / self.variance, slopes
 
-    def misfit(self, m: int, *, late: bool, forward: bool) -> float:
-        """Share of the variance left when the command acts before sample `m` only, or from there on.
+    def misfit(self, cuts: NDArray[np.int64], *, late: bool, forward: bool) -> Array:
+        """Shares (cuts,) of the variance left when the command acts before each of some samples only, or from it on.
 
         All of it when that has to be `forward` and the command would push backwards, in which case there is no trip.
         """
-        early = self.before(m)
+        early = self.before(cuts)
         left, slopes = self.explain(self.whole - early if late else early)
         if not forward:
             return left
-        acting = self.switched[m if late else m - 1]
+        acting = self.switched[cuts if late else cuts - 1]
         # the force at no speed is an extrapolation unless the command has several levels
-        pushed = float(slopes @ acting) * float(acting[0]) > 0 and (float(slopes[0]) > 0 or not self.levels)
-        return left if pushed else 1.0
+        pushed = np.sum(slopes * acting, axis=1) * acting[:, 0] > 0
+        return np.where(pushed & ((slopes[:, 0] > 0) | (not self.levels)), left, 1.0)
 
     @cached_property
     def levels(self) -> bool:
@@ -181,7 +187,8 @@ class TripRegression:
             tried = (
                 range(max(low, at - 10 * step), min(high, at + 10 * step), step) if costs else range(low, high, step)
             )
-            costs |= {m: self.misfit(m, late=late, forward=forward) for m in tried}
+            left = self.misfit(np.array(tried), late=late, forward=forward)
+            costs |= dict(zip(tried, left.tolist(), strict=True))
             at = min(costs, key=lambda m: costs[m])
         return at, costs
 
@@ -227,55 +234,88 @@ def trip_or_misfit(
     t: Array, u: Array, y: Array, others: Sequence[Array], *, resolution: float, late: bool, terms: Terms = linear
 ) -> tuple[Trip | None, float]:
     """What `find_trip` says, and what is left unexplained with the command as logged, infinite if nobody can say."""
-    nobody = None, math.inf
-    live = np.flatnonzero(u)
-    if t.size < 100 or live.size < 10:
-        return nobody
-    dt = float(t[-1] - t[0]) / (t.size - 1)
-    width = acceleration_width(y, dt, resolution)
-    if t.size < LEAST * width:
-        return nobody
-    speed, table = _regression(u, [y, *others], dt, width, late=late, terms=terms)
-    first, last = int(live[0]), int(live[-1]) + 1
-    low, high = first + width // 4, last - width // 4
-    if table is None or low >= high:
-        return nobody
-    at, costs = table.search(low, high, late=late)
-    begin, end = (last, first) if late else (first, last)
-    least, logged = costs[at], table.misfit(end, late=late, forward=False)
-    hardly = abs(speed[at]) < SLOW * float(np.abs(speed).max()) and not late
-    if not (least < CLEAR[table.levels] * logged and least < POOR) or hardly:
-        return None, logged
-    before, after = _accelerations(speed, dt, at, end, begin)
-    trip = Trip(
-        at=at * dt, error=_uncertainty(costs, at, t.size / width) * dt,
-        logged=end * dt, late=late, before=before, after=after, unexplained=least, otherwise=logged,
-    )  # fmt: skip
-    return trip, logged
+    return Driven.by(t, y, others, resolution=resolution, terms=terms).trip_or_misfit(u, late=late)
 
 
-def _regression(
-    u: Array, signals: Sequence[Array], dt: float, width: int, *, late: bool, terms: Terms, moving: bool = True
-) -> tuple[Array, TripRegression | None]:
-    """Speed (N,) of the first signal, and the regression of its acceleration; None with little motion."""
-    motion = replace(smoothed(signals, dt, width, order=3), q=np.array(signals))
-    speed, acceleration = motion.v[0], motion.a[0]
-    if not np.ptp(acceleration) > 0:
-        return speed, None
-    weights = middle(width, order=3)
-    columns = [np.ones(speed.size), np.tanh(speed / (0.02 * scatter(speed))), *terms(motion)]
-    # damping that is there with the command on goes with it
-    switched = np.stack([u, speed * (u != 0)], axis=1)
-    half = width // 2
-    tells = np.abs(speed) > STUCK * float(np.abs(speed).max())
-    # a body that sticks hides what pushes it, but under a constant command it cannot set out late
-    tells |= not moving or (late and not np.ptp(u[u != 0]))
-    rows = half + np.flatnonzero(tells[half : speed.size - half])
-    rows = rows[:: max(1, rows.size // ROWS)]
-    if rows.size < LEAST:
-        return speed, None
-    base = _smoothed(np.stack(columns, axis=1), weights)[rows]
-    return speed, TripRegression(rows=rows, target=acceleration[rows], base=base, switched=switched, weights=weights)
+@dataclass(frozen=True, kw_only=True)
+class Driven:
+    """A coordinate and those that pull at it, whatever command is looked at: the first of `signals` (N,) is driven.
+
+    Their motion is smoothed over `width` samples of `dt` seconds; `terms` say what acts.
+    """
+
+    dt: float
+    signals: Sequence[Array]
+    width: int
+    terms: Terms = linear
+
+    @classmethod
+    def by(cls, t: Array, y: Array, others: Sequence[Array], *, resolution: float, terms: Terms = linear) -> Driven:
+        """As for `find_trip`."""
+        dt = float(t[-1] - t[0]) / (t.size - 1) if t.size > 1 else 0.0
+        width = acceleration_width(y, dt, resolution) if t.size >= SHORT else t.size
+        return cls(dt=dt, signals=[y, *others], width=width, terms=terms)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Smoothed, but positions as they were read."""
+        return replace(smoothed(self.signals, self.dt, self.width, order=3), q=np.array(self.signals))
+
+    @cached_property
+    def weights(self) -> Array:
+        """The smoothing (width,) of positions, which all that acts goes through as well."""
+        return middle(self.width, order=3)
+
+    @cached_property
+    def acting(self) -> Array:
+        """What acts (N, columns) besides the command, smoothed: a constant, dry friction and the terms."""
+        speed = self.motion.v[0]
+        columns = [np.ones(speed.size), np.tanh(speed / (0.02 * scatter(speed))), *self.terms(self.motion)]
+        return _smoothed(np.stack(columns, axis=1), self.weights)
+
+    def regression(self, u: Array, *, late: bool, moving: bool = True) -> TripRegression | None:
+        """That of the acceleration under a command (N,); None with little motion."""
+        speed, acceleration = self.motion.v[0], self.motion.a[0]
+        if not np.ptp(acceleration) > 0:
+            return None
+        # damping that is there with the command on goes with it
+        switched = np.stack([u, speed * (u != 0)], axis=1)
+        half = self.width // 2
+        tells = np.abs(speed) > STUCK * float(np.abs(speed).max())
+        # a body that sticks hides what pushes it, but under a constant command it cannot set out late
+        tells |= not moving or (late and not np.ptp(u[u != 0]))
+        rows = half + np.flatnonzero(tells[half : speed.size - half])
+        rows = rows[:: max(1, rows.size // ROWS)]
+        if rows.size < LEAST:
+            return None
+        return TripRegression(
+            rows=rows, target=acceleration[rows], base=self.acting[rows], switched=switched, weights=self.weights
+        )
+
+    def trip_or_misfit(self, u: Array, *, late: bool) -> tuple[Trip | None, float]:
+        """A trip of the command (N,), and what is left unexplained with it as logged, infinite if nobody can say."""
+        nobody = None, math.inf
+        live = np.flatnonzero(u)
+        if u.size < SHORT or live.size < 10 or u.size < LEAST * self.width:
+            return nobody
+        table = self.regression(u, late=late)
+        first, last = int(live[0]), int(live[-1]) + 1
+        low, high = first + self.width // 4, last - self.width // 4
+        if table is None or low >= high:
+            return nobody
+        at, costs = table.search(low, high, late=late)
+        begin, end = (last, first) if late else (first, last)
+        least, logged = costs[at], float(table.misfit(np.array([end]), late=late, forward=False)[0])
+        speed = self.motion.v[0]
+        hardly = abs(speed[at]) < SLOW * float(np.abs(speed).max()) and not late
+        if not (least < CLEAR[table.levels] * logged and least < POOR) or hardly:
+            return None, logged
+        before, after = _accelerations(speed, self.dt, at, end, begin)
+        trip = Trip(
+            at=at * self.dt, error=_uncertainty(costs, at, u.size / self.width) * self.dt,
+            logged=end * self.dt, late=late, before=before, after=after, unexplained=least, otherwise=logged,
+        )  # fmt: skip
+        return trip, logged
 
 
 def _accelerations(speed: Array, dt: float, at: int, *ends: int) -> tuple[float, float]:
@@ -284,6 +324,28 @@ def _accelerations(speed: Array, dt: float, at: int, *ends: int) -> tuple[float,
     low, high = max(0, at - reach), min(speed.size - 1, at + reach)
     before, after = (np.polyfit(np.arange(v.size) * dt, v, 1)[0] for v in (speed[low:at], speed[at:high]))
     return float(before), float(after)
+
+
+def _length(rows: Array) -> Array:
+    """Lengths (...) of rows (..., T)."""
+    return np.sqrt(np.einsum("...t,...t->...", rows, rows))
+
+
+def _slopes(rows: Array, target: Array) -> Array:
+    """Least squares slopes (..., p) of a target (T,) on rows (..., p, T); the shortest where rows depend on others.
+
+    Orthogonalised by Gram and Schmidt, each row twice (Giraud, Langou and Rozloznik 2005).
+    """
+    Q, p = rows.copy(), rows.shape[-2]
+    R = np.zeros((*rows.shape[:-2], p, p))
+    for i in range(p):
+        for _ in range(2):
+            along = Q[..., :i, :] @ Q[..., i, :, None]
+            R[..., :i, i] += along[..., 0]
+            Q[..., i, :] -= (np.swapaxes(along, -1, -2) @ Q[..., :i, :])[..., 0, :]
+        R[..., i, i] = length = _length(Q[..., i, :])
+        Q[..., i, :] /= np.where(length > 0, length, 1.0)[..., None]
+    return (np.linalg.pinv(R, rcond=1e-5) @ (Q @ target)[..., None])[..., 0]
 
 
 def _smoothed(columns: Array, weights: Array) -> Array:
@@ -306,10 +368,12 @@ def goes_dead(t: Array, u: Array, y: Array, at: int) -> bool:
     """
     dt = float(t[-1] - t[0]) / (t.size - 1)
     width = max(7, int(0.06 / dt) | 1)
-    speed, table = _regression(u, [y], dt, width, late=False, terms=linear, moving=False)
+    driven = Driven(dt=dt, signals=[y], width=width)
+    table = driven.regression(u, late=False, moving=False)
     if table is None:
         return False
-    push = table.whole[:, 0]
+    speed = driven.motion.v[0]
+    push = table.whole[0]
     columns = np.column_stack([push, table.base])
     fast = np.abs(speed[table.rows]) > 0.05 * float(np.abs(speed).max())
     before, after = table.rows < at - width // 2, table.rows >= at + width // 2

@@ -11,7 +11,7 @@ import numpy as np
 from upright.identification.model.grey_box import GreyBox
 from upright.identification.model.runs import Run
 from upright.physics.regressor import regressor
-from upright.signals.trips import CLEAR, Terms, Trip, linear, trip_or_misfit
+from upright.signals.trips import CLEAR, Driven, Terms, Trip, linear
 
 
 def find_trips(rig: GreyBox, run: Run) -> list[Trip]:
@@ -54,13 +54,13 @@ def _moments(rig: GreyBox, run: Run) -> tuple[list[Trip], bool]:
     signals |= {c: v for c, v in run.held.items() if isinstance(v, np.ndarray)}
     signals |= {c: np.full(run.t.size, v) for c, v in run.held.items() if not isinstance(v, np.ndarray)}
     others = {c.name: signals[c.name] for c in rig.plant.coordinates if c.name in signals and c.name != on}
-    terms = _terms(rig, [on, *others])
+    driven = Driven.by(
+        run.t, signals[on], [*others.values()], resolution=resolution[on], terms=_terms(rig, [on, *others])
+    )
     gain = rig.parameters["actuator.gain"].value if "actuator.gain" in rig.parameters else 1.0
     for late in (False, True):
         u = silenced(run, trips).u[:, 0] * math.copysign(1.0, gain)
-        trip, otherwise = trip_or_misfit(
-            run.t, u, signals[on], [*others.values()], resolution=resolution[on], late=late, terms=terms
-        )
+        trip, otherwise = driven.trip_or_misfit(u, late=late)
         trips += [trip] if trip is not None else []
         plain = plain or (not late and trip is None and otherwise < CLEAR[1])
     return trips, plain
