@@ -41,7 +41,8 @@ class Optimum:
     the variances that uncorrelated residuals would give, `matrix` (n, n) is Gauss-Newton's, prior knowledge included.
     One weighted residual has the `variance`; residuals have forgotten themselves after `memory` seconds
     (autocorrelation below 1/e), which leaves so many independent `samples`. `lost` are the labels of runs whose motion
-    runs away at `x`, or as soon as a number is moved: then nothing is known of how sure the numbers are.
+    runs away at `x`, or as soon as a number is moved: then nothing is known of how sure the numbers are. `rows` are the
+    residuals (T, outputs) of each run and their Jacobian (T, outputs, sought in it), from central differences.
     """
 
     problem: Problem
@@ -55,6 +56,7 @@ class Optimum:
     samples: float
     pinned: NDArray[np.bool_]
     lost: tuple[str, ...] = ()
+    rows: tuple[tuple[Array, Array], ...] = ()
 
     @property
     def values(self) -> Array:
@@ -95,14 +97,15 @@ def assess(problem: Problem, x: Array) -> Optimum:
     A = np.zeros((size, size))
     hac, from_runs = np.zeros((size, size)), np.zeros((size, size))
     blocks: dict[int, list[tuple[Array, Array]]] = {number: [] for number in BLOCKS}
-    cost, count, runs, longest, independent = 0.0, 0, 0, 0.0, 0.0
+    cost, count, longest, independent = 0.0, 0, 0.0, 0.0
+    every: list[tuple[Array, Array]] = []
     lost: list[str] = []
     for index, track in enumerate(problem.tracks):
         rows = problem.rows(index, x, central=True)
         if rows is None or not squared(*rows):
             lost.append(track.run.label)
             continue
-        runs += 1
+        every.append(rows)
         r, J = rows
         sought = problem.sought_in(index)
         here = np.ix_(sought, sought)
@@ -141,6 +144,7 @@ def assess(problem: Problem, x: Array) -> Optimum:
     prior_meat = prior.T @ prior * problem.noise**2
     meat = hac + prior_meat
     covariance = sandwich = inverse @ meat @ inverse
+    runs = len(every)
     if runs > 1:
         spread = inverse @ (from_runs * runs / (runs - 1) + prior_meat) @ inverse
         covariance = covariance + _along(spread, np.maximum(np.diag(spread) - np.diag(covariance), 0.0))
@@ -148,7 +152,7 @@ def assess(problem: Problem, x: Array) -> Optimum:
     white = np.diag(inverse) * variance
     return Optimum(
         problem=problem, x=x, covariance=covariance, sandwich=sandwich, white=white, matrix=A, variance=variance,
-        memory=longest, samples=independent, pinned=pinned,
+        memory=longest, samples=independent, pinned=pinned, rows=tuple(every),
     )  # fmt: skip
 
 

@@ -116,6 +116,12 @@ class Track:
         return self.run.horizon is not None
 
     @property
+    def plain(self) -> bool:
+        """Whether the run is free, all its samples count, and each of its outputs stands for itself."""
+        whole = not self.windowed and not self.ahead and not self.first and self.retained is None
+        return whole and self.principal is None and bool(self.weights.all())
+
+    @property
     def uncertain(self) -> NDArray[np.int64]:
         """Places of the states that restarts know from a measurement only."""
         if not self.variance.any():

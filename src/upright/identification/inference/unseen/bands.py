@@ -97,13 +97,22 @@ def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
     return Sensitivity(error=next(ends), slope=next(ends), age=np.tile(time[1:], track.restarts.size))
 
 
+def _as_assessed(track: Track, r: Array, J: Array) -> Sensitivity:
+    """That of a run whose outputs stand for themselves, from its weighted residuals and their Jacobian."""
+    age: Array = track.dt * np.arange(len(r), dtype=np.float64)
+    return Sensitivity(error=r / track.weights, slope=J / track.weights[:, None], age=age)
+
+
 def calibrated(best: Optimum) -> Bands | None:
     """Bands that a fit promises, from blocks of its runs predicted by fits of the others; None where one runs away."""
     if best.lost:
         return None
     horizon = judged(best.problem, best.x)
     problem = best.problem if horizon is None else best.problem.ahead(horizon.seconds)
-    met = [sensitivity(problem, i, best.x) for i in range(len(problem.tracks))]
+    met = [
+        _as_assessed(track, *best.rows[i]) if horizon is None and track.plain else sensitivity(problem, i, best.x)
+        for i, track in enumerate(problem.tracks)
+    ]
     if not all(run.finite for run in met):
         return None
     blocks = _blocks(best)
@@ -180,10 +189,7 @@ class _Block:
 def _blocks(best: Optimum) -> list[_Block]:
     problem, free = best.problem, ~best.pinned
     blocks: list[_Block] = []
-    for index, track in enumerate(problem.tracks):
-        rows = problem.rows(index, best.x, central=True)
-        if rows is None:
-            continue
+    for index, (track, rows) in enumerate(zip(problem.tracks, best.rows, strict=True)):
         count = -(-BLOCKS // len(problem.tracks)) if track.run.t.size >= LEAST_RUN else 1
         sought = problem.sought_in(index)
         for number, cut in enumerate(np.array_split(np.arange(len(rows[0])), count)):
