@@ -221,13 +221,15 @@ class Problem:
         return x[:, None] + np.hstack([np.zeros((x.size, 1)), move, *([-move] if central else [])])
 
     def rows(
-        self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False
-    ) -> tuple[Array, Array] | None:
+        self, index: int, x: Array, horizon: float = math.inf, *, central: bool = False,
+        sought: NDArray[np.int64] | None = None,
+    ) -> tuple[Array, Array] | None:  # fmt: skip
         """Residuals (T, outputs) of one run, windows one after another, and their Jacobian (T, outputs, sought in it).
 
+        Of all that is sought in the run, or only of the places `sought`.
         None when the simulation ran away, or does as soon as a number is moved to either side.
         """
-        track, sought = self.tracks[index], self.sought_in(index)
+        track, sought = self.tracks[index], self.sought_in(index) if sought is None else sought
         n, m = track.within(horizon), sought.size
         restart = self.restart(index, x) if track.uncertain.size else None
         y = self.simulate(index, self.lanes(x, sought, central=central), n, restart.shift if restart else None)
@@ -379,21 +381,31 @@ class Problem:
         The model at `x` comes back, found with perturbations not far from those.
         """
         for _ in range(4):
-            before = self.steps
             here = self.normal(x, horizon)
-            self.rescale_steps(here, horizon)
-            if np.all((self.steps < 30 * before) & (self.steps > before / 30)):
+            if self.rescale_steps(here, horizon):
                 return here
         return self.normal(x, horizon)
 
-    def rescale_steps(self, normal: Normal, horizon: float) -> None:
-        """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds."""
+    def rescale_steps(self, normal: Normal, horizon: float = math.inf) -> bool:
+        """Choose perturbations by the effects found at an earlier evaluation within `horizon` seconds.
+
+        Whether those that it was found with were not far from these.
+        """
         samples = sum(t.within(horizon) * t.restarts.size for t in self.tracks)
-        effect = np.sqrt(np.maximum(np.diag(normal.matrix), 0.0) / samples)
-        wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * self.steps)
-        wanted = np.clip(wanted, self.steps * 1e-4, self.steps * 1e4)
-        scale = np.array([u.scale for u in self.unknowns])
-        self.steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
+        return self.resize_steps(np.arange(self.steps.size), np.maximum(np.diag(normal.matrix), 0.0) / samples)
+
+    def resize_steps(self, places: NDArray[np.int64], effect: Array) -> bool:
+        """Choose perturbations of some numbers by the mean square that each adds to a sample's outputs per unit.
+
+        Whether those that it was found with were not far from these.
+        """
+        before, effect = self.steps[places], np.sqrt(effect)
+        wanted = np.where(effect > 0, STEP / np.maximum(effect, 1e-300), 100 * before)
+        wanted = np.clip(wanted, before * 1e-4, before * 1e4)
+        scale = np.array([self.unknowns[i].scale for i in places])
+        self.steps = self.steps.copy()
+        self.steps[places] = steps = np.clip(wanted, 1e-9 * scale, 1e-3 * scale)
+        return bool(np.all((steps < 30 * before) & (steps > before / 30)))
 
     def prior_rows(self, x: Array) -> tuple[Array, Array]:
         """Residuals and Jacobian of what was known beforehand of coordinates `x`, worth `noise` per sigma.

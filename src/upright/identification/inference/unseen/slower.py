@@ -29,51 +29,77 @@ Array = NDArray[np.float64]
 SLOW = 0.1
 """Share of its largest speed: a joint that was fitted at slower swings has shown its friction at all speeds."""
 
+TRIED = 4
+"""Perturbations of stiction that are tried at most, until one moves the outputs by about what others do."""
+
 ABOVE = 1.01
-"""Stiction beside sliding friction where its effect is computed: at 1 it begins to act, and has half a slope."""
+"""Stiction beside sliding friction where its effect is computed from both sides: at 1 it begins to act."""
 
 
 def considered(best: Optimum, shared: Sequence[int]) -> tuple[SlowFriction, ...]:
-    """Friction below the slowest swings of the fitted runs, and how it moves the `shared` numbers when it is larger."""
-    problem = best.problem
+    """Friction below the slowest swings of the fitted runs, and how it moves the `shared` numbers when it is larger.
+
+    In the model that was fitted stiction goes with sliding friction, and the matrix at the optimum is known. It is
+    compared with what a little more stiction changes in the same motion: in another one all slopes are others.
+    """
+    problem, n = best.problem, best.x.size
     if any(track.ahead for track in problem.tracks):
         return ()
     value = problem.shared_at(best.x)
-    known = {n: replace(p, value=value.get(n, p.value)) for n, p in problem.rig.parameters.items()}
-    slow: list[SlowFriction] = []
-    for joint, speed in _slowest(problem.rig, [track.run for track in problem.tracks]):
-        if not known[joint.coulomb].value > 0:
-            continue
-        stiction, fades = _beside(replace(problem.rig, parameters=known), joint, speed)
-        wider = problem.beside(stiction, fades)
-        z = np.append(best.x, wider.unknowns[-1].coordinate(stiction.value))
-        wider.settle_steps(z)
-        matrix = _matrix(wider, z)
-        if not finite(matrix):
-            continue
-        together = np.eye(z.size)  # stiction goes with sliding friction, and what is considered is how it differs
-        together[-1, [u.name == joint.coulomb for u in wider.unknowns]] = 1.0
-        matrix, free = together.T @ matrix @ together, np.append(~best.pinned, False)
-        follow = np.zeros(z.size)
-        follow[free] = -pseudo_inverse(matrix[np.ix_(free, free)]) @ matrix[free, -1]
-        natural = np.array([v if u.log else 1.0 for u, v in zip(wider.unknowns, wider.value(z), strict=True)])
-        slow.append(
-            SlowFriction(coulomb=joint.coulomb, speed=speed, moves=(follow * natural / natural[-1])[list(shared)])
-        )
-    return tuple(slow)
+    known = {name: replace(p, value=value.get(name, p.value)) for name, p in problem.rig.parameters.items()}
+    joints = [
+        (joint, speed)
+        for joint, speed in _slowest(problem.rig, [track.run for track in problem.tracks])
+        if known[joint.coulomb].value > 0
+    ]
+    if not joints:
+        return ()
+    wider = problem
+    for joint, speed in joints:
+        wider = wider.beside(*_beside(replace(problem.rig, parameters=known), joint, speed, above=1.0))
+    numbers = wider.unknowns[n:]
+    z = np.append(best.x, [u.coordinate(u.value) for u in numbers])
+    together = _products(best, wider, z)
+    if together is None:
+        return ()
+    free = ~best.pinned
+    follow = np.zeros((n, len(numbers)))
+    follow[free] = -pseudo_inverse(best.matrix[np.ix_(free, free)]) @ together[free]
+    natural = np.array([v if u.log else 1.0 for u, v in zip(wider.unknowns, wider.value(z), strict=True)])
+    moves = (follow * natural[:n, None] / natural[n:])[list(shared)]
+    return tuple(
+        SlowFriction(coulomb=joint.coulomb, speed=speed, moves=moves[:, k]) for k, (joint, speed) in enumerate(joints)
+    )
 
 
-def _matrix(problem: Problem, x: Array) -> Array:
-    """Gauss-Newton matrix (sought, sought) from central differences, infinite where a run runs away."""
-    _, prior = problem.prior_rows(x)
-    A = prior.T @ prior
-    for index in range(len(problem.tracks)):
-        rows, sought = problem.rows(index, x, central=True), problem.sought_in(index)
-        if rows is None:
-            return np.full_like(A, np.inf)
-        J = rows[1].reshape(-1, sought.size)
-        A[np.ix_(sought, sought)] += J.T @ J
-    return A
+def _products(best: Optimum, wider: Problem, z: Array) -> Array | None:
+    """``J'J_k`` (n, more) of the numbers fitted and those that a problem has more; None where a run runs away.
+
+    These act beyond `z` alone, so slopes there are ``2 J(h) - J(2 h)``, of second order.
+    """
+    more = np.arange(best.x.size, z.size)
+    steps, near = wider.steps, _forward(best, wider, z, more)
+    for _ in range(TRIED):
+        if near is None or wider.resize_steps(more, near[1]):
+            break
+        steps, near = wider.steps, _forward(best, wider, z, more)
+    wider.steps = np.asarray(2 * steps)
+    far = _forward(best, wider, z, more)
+    return None if near is None or far is None else 2 * near[0] - far[0]
+
+
+def _forward(best: Optimum, wider: Problem, z: Array, more: NDArray[np.int64]) -> tuple[Array, Array] | None:
+    """``J'J_k`` (n, more) by forward differences, and the mean square that a sample's outputs change by per unit."""
+    together, squares, samples = np.zeros((best.x.size, more.size)), np.zeros(more.size), 0
+    for index, (_, J) in enumerate(best.rows):
+        rows = wider.rows(index, z, sought=more)
+        if rows is None or not finite(rows[1]):
+            return None
+        felt = rows[1].reshape(-1, more.size)
+        together[best.problem.sought_in(index)] += J.reshape(len(felt), -1).T @ felt
+        squares += np.sum(felt**2, axis=0)
+        samples += len(rows[1])
+    return together, squares / samples
 
 
 def slow_friction(
@@ -97,10 +123,10 @@ def _slowest(rig: GreyBox, runs: Sequence[Run]) -> Iterator[tuple[DryJoint, floa
             yield joint, float(each.min())
 
 
-def _beside(rig: GreyBox, joint: DryJoint, speed: float) -> tuple[Parameter, Parameter]:
+def _beside(rig: GreyBox, joint: DryJoint, speed: float, above: float = ABOVE) -> tuple[Parameter, Parameter]:
     level, unit = rig.parameters[joint.coulomb], rig.plant.quantity(joint.stribeck_speed).unit
     return (
-        Parameter(name=joint.stiction, value=ABOVE * level.value, unit=level.unit, estimate=True),
+        Parameter(name=joint.stiction, value=above * level.value, unit=level.unit, estimate=True),
         Parameter(name=joint.stribeck_speed, value=speed, unit=unit),
     )
 
