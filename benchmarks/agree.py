@@ -1,4 +1,4 @@
-"""Do two parts of one rig's data give the same numbers? 95 % intervals of each, fitted alone. Needs UPRIGHT_REAL_DATA.
+"""Do two parts of one rig's data give the same numbers? 95 % intervals of each, fitted alone.
 
 Parts are halves of a run, runs of one study, and studies of one rig. Both parts are fitted for the parameters that
 the study estimates. A run is halved within the stretch in which it moves, and a half may begin in mid-motion. What
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import measure
 from benchmarks.asked import studies
 from benchmarks.measure import Line, of_each
 from benchmarks.real import STUDIES
@@ -56,6 +57,8 @@ WHY = (
 )
 """What is known of pairs that disagree."""
 
+AGREE = 0.9
+"""Share of pairs that is required."""
 WIDE = 10.0
 """Intervals wider than this many times the larger of two values agree with anything."""
 
@@ -258,13 +261,19 @@ def grouped(pairs: Sequence[Pair]) -> Iterator[tuple[str, list[Pair]]]:
     yield "all", list(pairs)
 
 
+def counted(pairs: Sequence[Pair]) -> tuple[int, int]:
+    """How many of some pairs agree, of how many whose intervals are not too wide to disagree."""
+    narrow = [p for p in pairs if p.width <= WIDE]
+    return sum(p.agrees for p in narrow), len(narrow)
+
+
 def told(pairs: Sequence[Pair]) -> str:
     """How many of some pairs agree, and how wide their intervals are."""
     narrow = [p for p in pairs if p.width <= WIDE]
     note = "nothing to compare"
     if narrow:
-        agree = sum(p.agrees for p in narrow)
-        note = f"{agree} of {len(narrow)} pairs agree, {100 * agree / len(narrow):.0f} %; "
+        agree, of = counted(pairs)
+        note = f"{agree} of {of} pairs agree, {100 * agree / of:.0f} %; "
         note += f"median width of the wider {100 * float(np.median([p.width for p in narrow])):.2g} % of its value"
     if wide := [p for p in pairs if p.width > WIDE]:
         note += f"; {len(wide)} more are too wide to disagree, {sum(p.agrees for p in wide)} agree"
@@ -273,16 +282,12 @@ def told(pairs: Sequence[Pair]) -> str:
 
 def page(pairs: Sequence[Pair], left_out: Sequence[str]) -> str:
     """The published tables."""
-    first, _, *rest = (__doc__ or "").strip().splitlines()
+    groups = dict(grouped(pairs))
     lines = [
-        f"# Agreement: {first}",
-        "",
-        "Written by `UPRIGHT_REAL_DATA=... python -m benchmarks agree --markdown benchmarks/agree.md`.",
-        *rest,
         "",
         "| | |",
         "|---|---|",
-        *(f"| {what} | {told(some)} |" for what, some in grouped(pairs)),
+        *(f"| {what} | {told(some)} |" for what, some in groups.items()),
         "",
         "Names are those of [the paper](../docs/reference/nomenclature.md), SI. *Wide*: too wide to disagree. *(?)*: a"
         " fit is not trusted.",
@@ -298,4 +303,14 @@ def page(pairs: Sequence[Pair], left_out: Sequence[str]) -> str:
                      f"{verdict}{'' if p.trusted else ' (?)'} |")  # fmt: skip
     lines += ["", "## Why", "", *(f"- {reason}" for reason in WHY)]
     lines += ["", "## Left out", "", *(f"- {reason}" for reason in dict.fromkeys(left_out))]
-    return "\n".join(lines) + "\n"
+    result = headline({what: counted(some) for what, some in groups.items()})
+    return measure.page("agree", "Agreement", __doc__, lines, result, needs="UPRIGHT_REAL_DATA=... ")
+
+
+def headline(counts: Mapping[str, tuple[int, int]]) -> str:
+    """The result in a sentence, from pairs that agree, of how many, by group."""
+    agree, of = counts["all"]
+    few = [f"{name} ({a} of {b})" for name, (a, b) in counts.items() if a < AGREE * b and not name.startswith("all")]
+    return f"{agree} of {of} pairs agree, {100 * agree / of:.0f} % ({100 * AGREE:.0f} required)" + (
+        f"; fewer do of {', '.join(few)}." if few else "."
+    )

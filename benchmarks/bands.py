@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,12 +21,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.asked import studies
-from benchmarks.measure import Line, of_each, page
+from benchmarks.measure import Line, of_each, page, shares
 from benchmarks.misfit import Flaws, moved, read
 from benchmarks.real import STUDIES
 from benchmarks.rigs import MAKES, Make, asked, drawn, logged, sensed
 from upright.workers import HERE, Workers
 
+ASKED = (85, 95)
+"""Percent inside that is required over all real rigs."""
 SLOW = ("ecp205_spinup", "ecp205_closed_loop", "qube_balance")
 """Studies that take a minute or more; they come last."""
 
@@ -126,7 +128,23 @@ def run(
 def publish(file: Path, lines: list[Line]) -> None:
     """Write the lines as a page."""
     body = ["", "| | |", "|---|---|", *(f"| {line.contender} | {line.note} |" for line in lines)]
-    file.write_text(page("bands", "Unseen samples inside 90 % bands", __doc__, body), encoding="utf-8")
+    text = page("bands", "Unseen samples inside 90 % bands", __doc__, body, headline(lines))
+    file.write_text(text, encoding="utf-8")
+
+
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of all and of each rig."""
+    inside = shares(lines)
+    real = {name.removeprefix("rig "): share for name, share in inside.items() if name.startswith("rig ")}
+    if not real:
+        return f"{inside['all twins']:.1f} % of the samples of twins lie inside; real rigs were left out."
+    few = [f"{name} {share:.1f} %" for name, share in real.items() if share < ASKED[0]]
+    many = [f"{name} {share:.1f} %" for name, share in real.items() if share > ASKED[1]]
+    apart = "; ".join([*([f"fewer of {', '.join(few)}"] * bool(few)), *([f"more of {', '.join(many)}"] * bool(many))])
+    return (
+        f"{inside['all real rigs']:.1f} % of the samples of real rigs lie inside ({ASKED[0]} to {ASKED[1]} required"
+        f"{f': {apart}' if apart else ''}), and {inside['all twins']:.1f} % of those of twins."
+    )
 
 
 def _lines(real: Mapping[str, list[Seen]], made: Mapping[str, list[Seen]]) -> list[Line]:
@@ -136,7 +154,9 @@ def _lines(real: Mapping[str, list[Seen]], made: Mapping[str, list[Seen]]) -> li
     kinds = {"study": real, "rig": rigs, "twins like": made}
     lines = [_line(f"{kind} {n}", found) for kind, all_ in kinds.items() for n, found in all_.items() if found]
     if real:
-        lines.append(_line("all real rigs", [s for found in real.values() for s in found], "asked 85 to 95 %"))
+        lines.append(
+            _line("all real rigs", [s for found in real.values() for s in found], f"asked {ASKED[0]} to {ASKED[1]} %")
+        )
     else:
         lines.append(Line(contender="real rigs", note="left out: UPRIGHT_REAL_DATA names no folder"))
     return [*lines, _line("all twins", [s for found in made.values() for s in found])]

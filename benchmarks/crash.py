@@ -292,12 +292,17 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             f"{os.cpu_count()} processors ({platform.machine()}) shared with others, Python {platform.python_version()}"
         )
         head = ["", f"Measured on {machine}.", "", "| | worst loss, or median | |", "|---|---|---|"]
-        result = (
-            f"A log whose process was killed at 1 kHz lost at most its last {_seconds(lines[0])}, and "
-            f"{sum(x.error or 0 for x in lines):.0f} wrong rows were read from damaged files or a full disk."
-        )
+        result = headline(_seconds(lines[0]), round(sum(x.error or 0 for x in lines)))
         markdown.write_text(page("crash", "Logs that end badly", __doc__, [*head, *table], result), encoding="utf-8")
     return lines
+
+
+def headline(lost: str, wrong: int) -> str:
+    """The result in a sentence."""
+    return (
+        f"A log whose process was killed at 1 kHz lost at most its last {lost}, and {wrong} wrong rows were read from "
+        "damaged files or a full disk."
+    )
 
 
 def _cut(data: bytes, rng: random.Random) -> bytes:

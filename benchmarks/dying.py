@@ -44,11 +44,14 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
                     lines.append(Line(contender=f"{moment.name}: {way}", note=str(why)))
     if markdown is not None:
         of_them = [line for line in lines if line.reached is not None]
-        result = (
-            f"In {sum(bool(x.reached) for x in of_them)} of {len(of_them)} cases the drive was off within its bound."
-        )
+        result = headline(sum(bool(x.reached) for x in of_them), len(of_them))
         markdown.write_text(page("dying", "Dying", __doc__, ["", *_rows(lines)], result), encoding="utf-8")
     return lines
+
+
+def headline(right: int, cases: int) -> str:
+    """The result in a sentence."""
+    return f"In {right} of {cases} cases the drive was off within its bound."
 
 
 def _line(death: Death) -> Line:

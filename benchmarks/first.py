@@ -408,4 +408,16 @@ def _page(contacts: dict[str, list[Contact]]) -> str:
             if c.ended in ("refused", "out of time", "error"):
                 numbers = (c.refusal or c.said).splitlines()[0].replace("|", "/")[:160]
             body.append(f"| {c.log} | {c.dialect} | {c.plant} | {c.ended} | {kept} | {c.seconds:.1f} | {numbers} |")
-    return page("first", "First contact", __doc__, body)
+    every = [c for each in contacts.values() for c in each]
+    trusted, usable, wrong = (
+        sum(c.ended == "trusted" for c in every), sum(len(c.usable) for c in every), sum(len(c.wrong) for c in every)
+    )  # fmt: skip
+    return page("first", "First contact", __doc__, body, headline(trusted, len(every), usable, wrong, *agreeing(every)))
+
+
+def headline(trusted: int, contacts: int, usable: int, wrong: int, same: int, logs: int) -> str:
+    """The result in a sentence."""
+    return (
+        f"{trusted} of {contacts} contacts end with a trusted fit; of {usable} usable numbers {wrong} "
+        f"{'is' if wrong == 1 else 'are'} wrong, and {same} of {logs} logs give the same answer in every dialect."
+    )

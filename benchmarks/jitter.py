@@ -52,7 +52,9 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
                 "|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|"]  # fmt: skip
         rows = [_row(found) for found in all_of_them]
         content = [*head, *rows, "", *_histogram(all_of_them)]
-        markdown.write_text(page("jitter", "Jitter", __doc__, content, _result(all_of_them[0])), encoding="utf-8")
+        first = all_of_them[0]
+        result = headline(first.late, first.due, 1 / first.period, first.standing.priority, first.quantiles["max"])
+        markdown.write_text(page("jitter", "Jitter", __doc__, content, result), encoding="utf-8")
     return lines
 
 
@@ -77,10 +79,11 @@ def _lines(found: Jitter, *, asked: bool) -> list[Line]:
     return [late, work]
 
 
-def _result(of: Jitter) -> str:
+def headline(late: int, due: int, rate: float, priority: str, longest: float) -> str:
+    """The result in a sentence: late ticks of those due, at a rate [Hz], and the latest wake-up [s]."""
     return (
-        f"{of.late} of {of.due} ticks were late at {1 / of.period:.0f} Hz and {of.standing.priority} priority "
-        f"(at most {TOLERATED * of.due:.0f} allowed); the longest wake-up was {1e6 * of.quantiles['max']:.0f} µs late."
+        f"{late} of {due} ticks were late at {rate:.0f} Hz and {priority} priority (at most {TOLERATED * due:.0f} "
+        f"allowed); the longest wake-up was {1e6 * longest:.0f} µs late."
     )
 
 

@@ -328,6 +328,14 @@ def intervals(done: Sequence[Kept]) -> str:
     return f"{fits} fits; {held:.1f} % of {len(hits)} intervals contain the truth (95 +- {give:.1f} if honest)"
 
 
+def headline(kept: int, drafts: int, held: float) -> str:
+    """The result in a sentence, of drafts and of the percent of intervals that hold the truth."""
+    return (
+        f"{kept} of {drafts} drafts use nine tenths of the motion or more; {held:.1f} % of the intervals of trusted "
+        "fits contain the truth."
+    )
+
+
 def _page(done: Sequence[Kept]) -> str:
     body = ["", "| logs | kept |", "|---|---|", f"| all | {_told(done)} |"]
     body += [f"| {name} | {_told(each)} |" for name, each in _groups(done).items()]
@@ -352,8 +360,6 @@ def _page(done: Sequence[Kept]) -> str:
         told = (c.name, ", ".join(filter(None, how)), f"{k.moved:.1f}", f"{100 * k.share:.0f}", k.said, missed)
         body.append("| " + " | ".join(x.replace("|", "/") for x in told) + " |")
     trusted = [hit for k in done if k.trusted for hit in k.held.values()]
-    result = (
-        f"{sum(k.share >= KEPT for k in done)} of {len(done)} drafts use nine tenths of the motion or more; "
-        f"{100 * float(np.mean(trusted or [math.nan])):.1f} % of the intervals of trusted fits contain the truth."
-    )
+    held = 100 * float(np.mean(trusted or [math.nan]))
+    result = headline(sum(k.share >= KEPT for k in done), len(done), held)
     return page("kept", "What moves is kept", __doc__, body, result)

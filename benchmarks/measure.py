@@ -11,6 +11,7 @@ import functools
 import gc
 import importlib
 import math
+import re
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -110,12 +111,22 @@ def library(name: str, what: str, part: str, *size: int, **more: Any) -> Callabl
     return build
 
 
-def page(name: str, title: str, about: str | None, body: Sequence[str], headline: str = "") -> str:
-    """Published page of a benchmark: the question, the result in a sentence, the method as its module states it."""
+def page(
+    name: str, title: str, about: str | None, body: Sequence[str], headline: str, *, needs: str = ""
+) -> str:  # fmt: skip
+    """Published page of a benchmark: the question, the result in a sentence, the method as its module states it.
+
+    `needs` stands before the command.
+    """
     first, _, *rest = (about or "").strip().splitlines()
-    command = f"Written by `python -m benchmarks {name} --markdown benchmarks/{name}.md`."
-    result = [f"**{headline}**", ""] if headline else []
-    return "\n".join([f"# {title}: {first}", "", *result, command, "", *rest, *body]) + "\n"
+    command = f"Written by `{needs}python -m benchmarks {name} --markdown benchmarks/{name}.md`."
+    return "\n".join([f"# {title}: {first}", "", f"**{headline}**", "", command, "", *rest, *body]) + "\n"
+
+
+def shares(lines: Iterable[Line]) -> dict[str, float]:
+    """Percent that a line's note begins with, by the line's name; those that begin otherwise are left out."""
+    found = {line.contender: re.match(r"([\d.]+) %", line.note) for line in lines}
+    return {name: float(match[1]) for name, match in found.items() if match}
 
 
 def built(builders: dict[str, Callable[[], Contender]]) -> tuple[list[Contender], list[Line]]:

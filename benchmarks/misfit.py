@@ -20,13 +20,13 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import Line, Spread, of_each
+from benchmarks.measure import Line, Spread, of_each, shares
 from benchmarks.rigs import DT, MAKES, Make, Outcome, drawn, judged, publish, sensed, told
 from upright.workers import HERE, Workers
 
@@ -49,6 +49,8 @@ BEHIND, DAMPED = 0.1, 0.05
 """Share of the driven inertia that sits behind the belt, and damping ratio of their resonance."""
 
 
+ALL, KIND = (90, 99), 85
+"""Percent of all intervals and of those of one kind that are required."""
 SEED = 310_000
 """Of the first rig; what intervals hold was never chosen on these."""
 
@@ -175,6 +177,14 @@ def one(make: Make, record: tuple[dict[str, float], np.ndarray, np.ndarray, int]
     return judged(make, truth, u, y, np.random.default_rng(seed))
 
 
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of all and of each kind of number."""
+    held = shares(lines)
+    few = [f"{name} {share:.1f} %" for name, share in held.items() if share < KIND]
+    rest = f"fewer than {KIND} % do of {', '.join(few)}" if few else f"of each kind {KIND} % or more do"
+    return f"{held['all']:.1f} % of all intervals contain the truth ({ALL[0]} to {ALL[1]} required); {rest}."
+
+
 def run(
     *, quick: bool, progress: Callable[[str], None], markdown: Path | None = None, workers: Workers = HERE
 ) -> list[Line]:
@@ -186,5 +196,5 @@ def run(
         done[make.plant] = of_each(functools.partial(one, make), records(make, place, each), workers)
     lines = told(done)
     if markdown is not None:
-        publish(markdown, "misfit", "Coverage under wrong models", __doc__, lines)
+        publish(markdown, "misfit", "Coverage under wrong models", __doc__, lines, headline(lines))
     return lines

@@ -128,8 +128,18 @@ def run(
     minutes, _ = of_each(minute, list(seeds), workers)
     lines = _lines(minutes)
     if markdown is not None:
-        markdown.write_text(page("quick_lab", "A minute at a rig", __doc__, _table(minutes, lines)), encoding="utf-8")
+        result = headline(sum(m.right for m in minutes), len(minutes), sum(m.went > 1.0 for m in minutes))
+        text = page("quick_lab", "A minute at a rig", __doc__, _table(minutes, lines), result)
+        markdown.write_text(text, encoding="utf-8")
     return lines
+
+
+def headline(right: int, twins: int, beyond: int) -> str:
+    """The result in a sentence."""
+    return (
+        f"{right} of {twins} twins came upright or had every fault named ({LEAST} required), and {beyond or 'none'} "
+        f"went beyond {'their' if beyond > 1 else 'its'} travel."
+    )
 
 
 def _lines(minutes: list[Minute]) -> list[Line]:

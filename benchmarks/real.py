@@ -1,17 +1,26 @@
-"""Do the studies of real rigs reach what was asked, and how long does each take warm? Needs UPRIGHT_REAL_DATA.
+"""Do the studies of real rigs reach what was asked, and how long does each take warm?
 
-`--markdown benchmarks/real.md` writes the table that is published.
+- *Reached* is the fit percent, `100 (1 - |y - simulated| / |y - mean|)`, of a free run from the first sample, or of
+  predictions as far ahead as stated.
+- *Left out*: every run in turn predicted from a fit of the others. It chooses only what the study declares unknown for
+  a single run.
+- *Twist*: first minus second coordinate.
+- *Speed*: slope by parabolas over 50 ms, in measurement and model alike.
+- *Seconds* are warm, from study file to verdict.
+
+Each study gives its report page with `upright identify examples/studies/STUDY.toml --data DIR -o OUT`.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks import measure
 from benchmarks.asked import ASKED, Asked, studies
 from benchmarks.measure import Line, Target, spread
 
@@ -103,20 +112,11 @@ def _span(reached: dict[str, float], asked: Asked) -> str:
 def page(results: list[Result]) -> str:
     """The published table."""
     lines = [
-        "# Real rigs: reached beside asked",
-        "",
-        "Written by `UPRIGHT_REAL_DATA=... python -m benchmarks real --markdown benchmarks/real.md`.",
-        "Fit percent is `100 (1 - |y - simulated| / |y - mean|)` of a free run from the first sample, or of predictions"
-        " as far ahead as stated.",
-        "*Left out*: every run in turn predicted from a fit of the others; it chooses only what the study declares"
-        " unknown for a single run. *Twist*: first minus second coordinate. *Speed*: slope by parabolas over 50 ms in"
-        " measurement and model alike.",
-        "Each study gives its report page with `upright identify examples/studies/STUDY.toml --data DIR -o OUT`.",
-        "Seconds are warm, from study file to verdict.",
         "",
         "| study | signal | runs | reached [%] | asked [%] | |",
         "|---|---|---|---|---|---|",
     ]
+    met = [asked.met(r.reached(asked)) for r in results for asked in ASKED if asked.study == r.study]
     for r in results:
         for asked in (a for a in ASKED if a.study == r.study):
             reached = r.reached(asked)
@@ -130,4 +130,14 @@ def page(results: list[Result]) -> str:
             )
     lines += ["", "| study | seconds | verdict |", "|---|---|---|"]
     lines += [f"| {r.study} | {r.seconds[0]:.2g} | {r.fit.verdict.replace('|', '/')} |" for r in results]
-    return "\n".join(lines) + "\n"
+    result = headline(sum(met), len(met), [r.seconds[0] for r in results])
+    return measure.page("real", "Real rigs", __doc__, lines, result, needs="UPRIGHT_REAL_DATA=... ")
+
+
+def headline(reached: int, of: int, seconds: Sequence[float]) -> str:
+    """The result in a sentence, of the figures that were required and the seconds of each study."""
+    slow = sum(s > TARGET.most for s in seconds)
+    return (
+        f"{reached} of {of} figures that were required are reached; a study takes {min(seconds):.2g} to "
+        f"{max(seconds):.2g} s" + (f", {slow} of {len(seconds)} more than {TARGET.most:g} s." if slow else ".")
+    )

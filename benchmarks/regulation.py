@@ -249,6 +249,7 @@ def run(
     """Brier score and its parts, for the twins and for those identified as in experiment 1b."""
     lines: list[Line] = []
     rows: list[str] = []
+    main: tuple[int, float, float, float, float] | tuple[()] = ()
     for what, (all_, few, swept, flawed) in KINDS.items():
         count = few if quick else all_
         progress(f"{count} twins {what}")
@@ -270,12 +271,23 @@ def run(
             )
         )  # fmt: skip
         rows += table(what, found, predicted, held, count - len(kept))
+        if not main:
+            main = (held.size, float(held.mean()), float(predicted.mean()), found.brier, found.expected)
         if markdown is not None and what == "identified by steps":
             save(reliability_figure(predicted, held, bins=BINS), IMAGE)
     if markdown is not None:
         picture = ["", f"![Share of twins that held, against the probability predicted](../{IMAGE.as_posix()})"]
-        markdown.write_text(page("regulation", "Calibration", __doc__, [*picture, *rows]), encoding="utf-8")
+        result = headline(*main)
+        markdown.write_text(page("regulation", "Calibration", __doc__, [*picture, *rows], result), encoding="utf-8")
     return lines
+
+
+def headline(twins: int, held: float, predicted: float, brier: float, expected: float) -> str:
+    """The result in a sentence, of shares that were stabilised and predicted, and of Brier scores."""
+    return (
+        f"Of {twins} twins {100 * held:.1f} % were stabilised, and {100 * predicted:.1f} % were predicted to be; the "
+        f"Brier score is {brier:.4f}, and {expected:.4f} is expected of right probabilities."
+    )
 
 
 @styled

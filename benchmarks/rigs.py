@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.coverage import noise
-from benchmarks.measure import Line, Spread, of_each, page
+from benchmarks.measure import Line, Spread, of_each, page, shares
 from upright.workers import HERE, Workers
 
 SECONDS, DT = 8.0, 5e-3
@@ -161,14 +161,22 @@ def run(
         done[make.plant] = of_each(functools.partial(outcome, make), seeds, workers)
     lines = told(done)
     if markdown is not None:
-        publish(markdown, "rigs", "Coverage", __doc__, lines)
+        publish(markdown, "rigs", "Coverage", __doc__, lines, headline(lines))
     return lines
 
 
-def publish(file: Path, name: str, title: str, about: str | None, lines: list[Line]) -> None:
+def publish(file: Path, name: str, title: str, about: str | None, lines: list[Line], result: str) -> None:
     """Write the lines as a page."""
     body = ["", "| | |", "|---|---|", *(f"| {line.contender} | {line.note} |" for line in lines)]
-    file.write_text(page(name, title, about, body), encoding="utf-8")
+    file.write_text(page(name, title, about, body, result), encoding="utf-8")
+
+
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of all and of each kind of number."""
+    held = shares(lines)
+    least = min(held, key=lambda name: held[name])
+    (note,) = (line.note for line in lines if line.contender == "all")
+    return f"{note.partition(',')[0]}; of one kind at least {held[least]:.1f} % do ({least})."
 
 
 def told(done: dict[str, tuple[list[Outcome], Spread]]) -> list[Line]:

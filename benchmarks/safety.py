@@ -340,9 +340,14 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
                 *late,
             ]
         judged_lines = [line for line in lines if line.reached is not None]
-        result = f"{len(judged_lines) - len(missed)} of {len(judged_lines)} cases ended as required."
+        result = headline(len(judged_lines) - len(missed), len(judged_lines))
         markdown.write_text(page("safety", "Safety", __doc__, [*body, *last], result), encoding="utf-8")
     return lines
+
+
+def headline(right: int, cases: int) -> str:
+    """The result in a sentence."""
+    return f"{right} of {cases} cases ended as required."
 
 
 HEAD = (

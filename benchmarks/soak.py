@@ -25,10 +25,11 @@ import gc
 import math
 import os
 import random
+import re
 import subprocess
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -372,8 +373,23 @@ def run(
     lines.append(Line(contender="the host's parser", note=note))
     lines.append(_libfuzzer(frames))
     if markdown is not None:
-        publish(markdown, "soak", "Soak", __doc__, lines)
+        publish(markdown, "soak", "Soak", __doc__, lines, headline(lines))
     return lines
+
+
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of the rigs."""
+    rigs = [line.note for line in lines if "ticks" in line.note]
+    hours, faults, on, lost = (
+        sum(float(re.search(pattern, note)[1]) for note in rigs)  # type: ignore[index]
+        for pattern in (r"([\d.]+) h,", r"(\d+) faults", r"stage on: (\d+)", r"lost (\d+)")
+    )
+    unseen = sum("outlived: none" not in note for note in rigs)
+    return (
+        f"In {hours:.2f} hours with {faults:.0f} faults the output stayed on {on:.0f} times after a stop, "
+        f"{lost:.0f} rows were lost, and "
+        + ("no fault went unnoticed." if not unseen else f"faults went unnoticed on {unseen} of {len(rigs)} rigs.")
+    )
 
 
 def _line(name: str, period: float, done: list[Outcome]) -> Line:

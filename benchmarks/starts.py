@@ -11,8 +11,9 @@ from __future__ import annotations
 import functools
 import math
 import os
+import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,8 @@ from upright.workers import HERE, Workers
 SPREAD, NEAR = 0.3, 0.005
 """Of the logarithms of the guesses; share above the lowest cost known within which a search has found it."""
 STARTS, QUICK, FEWEST = 300, 2, 3
+REQUIRED = 0.95
+"""Share of the starts."""
 
 
 @functools.cache
@@ -80,6 +83,18 @@ def within(name: str, starts: int, seconds: float, workers: Workers) -> list[tup
     return done
 
 
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the line of each study."""
+    counts = {line.contender: [int(n) for n in re.findall(r"\d+", line.note)[:2]] for line in lines}
+    found, of = (sum(column) for column in zip(*counts.values(), strict=True))
+    few = [f"{name} ({a} of {b})" for name, (a, b) in counts.items() if a < REQUIRED * b]
+    return f"{found} of {of} searches end where the cost is least; " + (
+        f"fewer than {100 * REQUIRED:.0f} % do of {', '.join(few)}."
+        if few
+        else f"{100 * REQUIRED:.0f} % or more do of every study."
+    )
+
+
 def run(
     *, quick: bool, progress: Callable[[str], None], workers: Workers = HERE, starts: int = STARTS,
     seconds: float = 60.0, markdown: Path | None = None,
@@ -99,5 +114,5 @@ def run(
         note += f"% of the lowest cost known; the study's own guesses at {own / least:.4g} times that; {cpu:.2g} s CPU "
         lines.append(Line(contender=name, seconds=(cpu, cpu, cpu), note=note + "each"))
         if markdown is not None:  # what is done is kept, should somebody interrupt
-            publish(markdown, "starts", "Random starts", __doc__, lines)
+            publish(markdown, "starts", "Random starts", __doc__, lines, headline(lines))
     return lines

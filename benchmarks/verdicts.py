@@ -20,7 +20,8 @@ its runs show, was not tested by the runs held out, or its own bands allow a lar
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -153,7 +154,7 @@ def run(
                  dict.fromkeys(question for question, *_ in every)]  # fmt: skip
         table = [*named, _line("all of them", [one[1:] for one in every])]
         if markdown is not None:  # what is done is kept, should somebody interrupt
-            publish(markdown, "verdicts", "Verdicts", __doc__, table)
+            publish(markdown, "verdicts", "Verdicts", __doc__, table, headline(table))
         return table
 
     for place, make in enumerate(MAKES[: 1 if quick else None]):
@@ -170,6 +171,24 @@ def run(
             every += rehearsed(name)
             lines()
     return lines()
+
+
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of two questions, their last the line of all."""
+    yes, no = (
+        {
+            line.contender: float(found[1])
+            for line in lines
+            if (found := re.search(rf"wrong {word} ([\d.]+) %", line.note))
+        }
+        for word in ("yes", "no")
+    )
+    predicts, numbers, every = "Does it predict?", "Can its numbers be used?", lines[-1].contender
+    parts = [f"{no[q]:.1f} % of *{q}*" for q in (predicts, numbers) if q in no]
+    return (
+        f'{yes[every]:.1f} % of the answers "yes" were wrong (at most 5 required), and of the answers "no" '
+        f"{' and '.join(parts)} (15)."
+    )
 
 
 def _line(question: str, told: list[tuple[str, bool]]) -> Line:

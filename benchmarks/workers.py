@@ -171,6 +171,7 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     block = one.items / len(seeds)
     progress("fits")
     lines += duel("fits", fits, range(4 if quick else 40), two, min(rounds, 5))[0]
+    faster = [1 / line.ratio[0] for line in lines if line.ratio]
     progress("nothing at all")
     lines.append(idle("two processes", two, 200 if quick else 2000)[0])
     if not quick:
@@ -196,7 +197,8 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
             f"{os.cpu_count()} processors ({platform.machine()}) shared with others, Python {sys.version.split()[0]}"
         )
         table = ["", f"Measured on {machine}.", "", "| | best on the wall | |", "|---|---|---|", *rows, ""]
-        text = page("workers", "More workers", __doc__, [*table, *plan(block, scaling).splitlines()])
+        body = [*table, *plan(block, scaling).splitlines()]
+        text = page("workers", "More workers", __doc__, body, headline(*faster))
         markdown.write_text(text, encoding="utf-8")
     return lines
 
@@ -209,6 +211,14 @@ def _cluster(seeds: Sequence[Any], progress: Callable[[str], None]) -> list[Line
             return [duel("closed loops", loops, seeds, shared, 3)[0][1], idle("a Dask cluster of two", shared, 1000)[0]]
     except ImportError:
         return [Line(contender="a Dask cluster of two", note="left out: distributed is not installed")]
+
+
+def headline(loops: float, fits: float) -> str:
+    """The result in a sentence, of how many times as fast two processes are."""
+    return (
+        f"Two processes run closed loops {loops:.2f} times as fast as one, and whole fits {fits:.2f} times ({ASKED} "
+        "required)."
+    )
 
 
 def amount(seconds: float) -> str:

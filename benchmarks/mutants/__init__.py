@@ -112,7 +112,8 @@ def run(
     if markdown is not None:
         where = f", within {within}" if within else ""
         asked = f"Sample {len(changes)}, seed {seed}{where}; {len(done)} were tried, with {seconds:g} s of quick tests."
-        text = page("mutants", "Changes that tests notice", __doc__, _body(asked, lines, passed))
+        body, result = _body(asked, lines, passed), headline(lines)
+        text = page("mutants", "Changes that tests notice", __doc__, body, result)
         markdown.write_text(text, encoding="utf-8")
     return lines
 
@@ -143,6 +144,17 @@ def table(
              note=f"{o.shown} ({_tests(o, slowly.get(o.change))})")
         for o in missed
     ]  # fmt: skip
+
+
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of all changes by quick tests, and by slow ones where they ran."""
+    notes = {line.contender.removesuffix(NOT): line.note.partition(";")[0] for line in lines}
+    both = notes.get("all, by quick and slow tests")
+    return (
+        f"Of all changes that matter quick tests noticed {notes['all'].replace(' noticed', '')}"
+        + (f", and with slow tests {both.replace(' noticed', '')}" if both else "")
+        + f"; {100 * (1 - UNNOTICED):.0f} % are required."
+    )
 
 
 def _tests(quick: Outcome, slow: Outcome | None) -> str:

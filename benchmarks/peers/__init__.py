@@ -10,8 +10,7 @@ authors advise. The scripts are in `benchmarks/peers`.
 - **SINDy and NARX**, as written here, take one angle and no command.
 - **Seconds** are CPU seconds, compilers included, so that other work on the machine does not count as much.
 
-Where others are ahead: opty on aau, and on the driven Furuta pendulum SciPy in the pendulum (and behind in the arm).
-Neither is explained. SciPy is also ahead on the balanced QUBE-Servo, 200 ms ahead.
+Who is ahead of upright stands above each table. Why is not explained.
 
 Extra `peers`: `pip install '.[peers]'`. opty also needs IPOPT, whose Python interface (cyipopt) is built from source:
 `apt install coinor-libipopt-dev liblapack-dev libblas-dev pkg-config gcc`, then `pip install cyipopt opty`. A tool that
@@ -25,7 +24,7 @@ import importlib
 import inspect
 import io
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
@@ -36,13 +35,23 @@ from types import ModuleType
 
 import numpy as np
 
-from benchmarks.measure import Line, page
+from benchmarks.measure import Line, page, shares
 
 TWINS, FEW = 20, 8
 """Twins of each kind, and for a peer that takes half a minute for one."""
 TIE = 0.2
 """Points of fit percent by which two predictions may differ and be as good."""
 STRIBECK = 0.4
+HELD_OUT, HALVES = "Runs that were held out: fit percent", "Do halves of one record agree?"
+APART = {
+    "qube": "A balanced QUBE-Servo, predicted ahead: fit percent",
+    "carts": "Two carts on springs, every run held out in turn: fit percent",
+}
+"""Sections whose tasks have modules of their own; `python -m benchmarks.peers NAME` runs one."""
+TRUTHS = ("with a right model", "with Stribeck friction that nobody models")
+INTERVALS = "Intervals of 95 % on Furuta twins {}"
+PREDICTED = ("held out", *APART)
+"""Questions whose lines are fit percents of what nobody saw."""
 POOR = 0.3
 """Seconds of a twin's motion that tell little."""
 
@@ -103,32 +112,57 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
         shaken = [] if quick else [driven(Path(data))]
         body += [
             "",
-            "## Runs that were held out: fit percent",
+            f"## {HELD_OUT}",
             "",
             *_tails(grey + black, tasks + shaken, lines, progress),
         ]
-        if not quick:
-            body += [
-                "",
-                "## A balanced QUBE-Servo, predicted ahead: fit percent",
-                "",
-                *_qube(Path(data), lines, progress),
-            ]
-        body += ["", "## Do halves of one record agree?", "", *_halves(grey, tasks, lines, progress)]
+        for name in () if quick else APART:
+            body += ["", f"## {APART[name]}", "", *apart(name, Path(data), lines, progress)]
+        body += ["", f"## {HALVES}", "", *_halves(grey, tasks, lines, progress)]
     else:
         lines.append(Line(contender="real logs", note="left out: UPRIGHT_REAL_DATA names no folder"))
     count = 1 if quick else TWINS
-    for title, stribeck in (("with a right model", 0.0), ("with Stribeck friction that nobody models", STRIBECK)):
+    for title, stribeck in zip(TRUTHS, (0.0, STRIBECK), strict=True):
         tasks = [twin(seed, stribeck=stribeck) for seed in range(count)]
-        body += ["", f"## Intervals of 95 % on Furuta twins {title}", "", *_twins(grey, title, tasks, lines, progress)]
+        body += ["", f"## {INTERVALS.format(title)}", "", *_twins(grey, title, tasks, lines, progress)]
     whole = twin(0)
     poor = replace(whole, fitted=whole.fitted.part(0, round(POOR / 2e-3)))
     body += ["", f"## What is said of poor data ({POOR:g} s of a twin)", "", *_poor(grey, poor, lines, progress)]
     body += ["", "## Lines that a user writes", "", *_lines(grey)]
     if markdown is not None:
         note = ", ".join(f"{name} {version(name)}" for name in _versions())
-        markdown.write_text(page("peers", "Peers", __doc__, ["", f"Versions: {note}.", *body]), encoding="utf-8")
+        text = page("peers", "Peers", __doc__, ["", f"Versions: {note}.", *body], headline(lines))
+        markdown.write_text(text, encoding="utf-8")
     return lines
+
+
+def headline(lines: Sequence[Line]) -> str:
+    """The result in a sentence, from the lines of what was predicted and of the twins' intervals."""
+    cells: dict[str, dict[str, list[float | None]]] = {}
+    for line in lines:
+        question, _, peer = line.contender.partition(": ")
+        if question in PREDICTED:
+            cells.setdefault(question, {})[peer] = [_mean(cell) for cell in line.note.split(", ")]
+    best, runs = 0, 0
+    for peers in cells.values():
+        for own, *others in zip(peers.pop("upright"), *peers.values(), strict=True):
+            best += own is not None and own >= max(x for x in others if x is not None) - TIE
+            runs += 1
+    held = {name: share for name, share in shares(lines).items() if name.startswith("with ")}
+    own, others = ([x for name, x in held.items() if name.endswith(": upright") is mine] for mine in (True, False))
+    return (
+        f"Of {runs} predictions of unseen samples upright's is the best, or within {TIE:g} points of it, in {best}; "
+        f"its 95 % intervals hold the truth of twins in {' and '.join(f'{x:.0f}' for x in own)} % of the cases, those "
+        f"of the others in {min(others):.0f} to {max(others):.0f} %."
+    )
+
+
+def _mean(cell: str) -> float | None:
+    """Of the fit percents in a cell; None where there are none, or one diverged."""
+    try:
+        return float(np.mean([float(part) for part in cell.split(" / ")]))
+    except ValueError:
+        return None
 
 
 def _present(peers: tuple[Peer, ...]) -> tuple[list[Peer], dict[str, str]]:
@@ -197,23 +231,61 @@ def _tails(peers, tasks, lines, progress) -> list[str]:
                 means[peer.name].append(float(np.mean(percent)) if percent else None)
         body.append(f"| {peer.name} | {' | '.join(cells)} | {', '.join(seconds)} |")
         lines.append(Line(contender=f"held out: {peer.name}", note=", ".join(cells)))
+    return [_better(means, [f"{task.name}, {label}" for task, label in labels]), "", *body]
+
+
+def apart(name: str, data: Path, lines: list[Line], progress: Callable[[str], None]) -> list[str]:
+    """A section whose task has a module of its own: what it asks, who is better than upright, and the table."""
+    code = importlib.import_module(f"benchmarks.peers.{name}")
+    rows = code.table(data, progress)
+    found = _predictions(name, rows)
+    lines += found
+    labels = [cell.strip() for cell in rows[0].split("|")[2:-2]]
+    means = {line.contender.partition(": ")[2]: [_mean(cell) for cell in line.note.split(", ")] for line in found}
+    return [*(code.__doc__ or "").strip().splitlines(), "", _better(means, labels), "", *rows]
+
+
+def _predictions(question: str, rows: Sequence[str]) -> list[Line]:
+    """Lines of a table of fit percents, whose first cell is a peer and whose last one is seconds."""
+    cells = [[cell.strip() for cell in row.strip()[1:-1].split("|")] for row in rows[2:]]
+    return [Line(contender=f"{question}: {own[0]}", note=", ".join(own[1:-1])) for own in cells]
+
+
+def _better(means: Mapping[str, Sequence[float | None]], labels: Sequence[str]) -> str:
+    """Who predicts better than upright, where, and by how many points."""
     ahead = [
-        f"{name} on {task.name}, {label} ({other - own:.1f})"
+        f"{name} on {label} ({other - own:.1f})"
         for name, others in means.items()
-        for (task, label), own, other in zip(labels, means["upright"], others, strict=True)
+        for label, own, other in zip(labels, means["upright"], others, strict=True)
         if own is not None and other is not None and other > own + TIE
     ]
-    first = f"Better than upright by more than {TIE:g} points, in the mean of a run's angles: "
-    return [f"{first}{'; '.join(ahead) or 'nobody'}.", "", *body]
+    who = "; ".join(ahead) or "nobody"
+    return f"Better than upright by more than {TIE:g} points, in the mean of a run's signals: {who}."
 
 
-def _qube(data: Path, lines, progress) -> list[str]:
-    from benchmarks.peers import qube
+def lines_in(text: str) -> list[Line]:
+    """Lines of a published page that its headline rests on, read back from its tables."""
+    sections = dict(part.split("\n", 1) for part in text.split("\n## ")[1:])
+    tables = {title: [row for row in part.splitlines() if row.startswith("|")] for title, part in sections.items()}
+    lines = _predictions("held out", tables[HELD_OUT])
+    for name in APART:
+        lines += _predictions(name, tables.get(APART[name], []))
+    for kind in TRUTHS:
+        cells = [[cell.strip() for cell in row[1:-1].split("|")] for row in tables[INTERVALS.format(kind)][2:]]
+        lines += [Line(contender=f"{kind}: {own[0]}", note=own[2]) for own in cells]
+    return lines
 
-    rows = qube.table(data, progress)
-    lines += [Line(contender=f"QUBE ahead: {cells[1].strip()}", note=", ".join(c.strip() for c in cells[2:4]))
-              for cells in (row.split("|") for row in rows[2:])]  # fmt: skip
-    return [*(qube.__doc__ or "").strip().splitlines(), "", *rows]
+
+def renewed(text: str, name: str, section: Sequence[str]) -> str:
+    """A published page with one section of `APART`, put before the halves, and the headline that then holds."""
+    first, *parts = text.split("\n## ")
+    kept = [part for part in parts if not part.startswith(APART[name])]
+    place = next(k for k, part in enumerate(kept) if part.startswith(HALVES))
+    kept.insert(place, "\n".join([APART[name], "", *section, ""]))
+    text = "\n## ".join([first, *kept])
+    lines = text.splitlines()
+    lines[2] = f"**{headline(lines_in(text))}**"
+    return "\n".join(lines) + "\n"
 
 
 def _halves(peers, tasks, lines, progress) -> list[str]:

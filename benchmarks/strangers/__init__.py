@@ -297,13 +297,10 @@ def told(endings: list[Ending]) -> str:
     return "; ".join(parts)
 
 
-def headline(endings: list[Ending]) -> str:
-    """The result in a sentence."""
-    trusted = [e for e in endings if e.trusted and e.held]
-    held = sum(all(e.held) for e in trusted)
+def headline(trusted: int, fits: int, held: int) -> str:
+    """The result in a sentence; of the rigs whose fits were trusted, `held` stood in every run."""
     return (
-        f"{len(trusted)} of {len(endings)} fits were trusted, and {held} of these rigs were stabilised in every run "
-        f"({STARTS} each)."
+        f"{trusted} of {fits} fits were trusted, and {held} of these rigs were stabilised in every run ({STARTS} each)."
     )
 
 
@@ -318,4 +315,6 @@ def _page(lines: list[Line], endings: list[Ending]) -> str:
         said = e.ended.splitlines()[0].replace("|", "/")[:200] if e.ended else ""
         trusted = "yes" if e.trusted else "no"
         body.append(f"| {e.kind} {e.seed} | {trusted} | {chance} | {held} | {effort} | {e.seconds:.1f} | {said} |")
-    return page("strangers", "Strangers' rigs", __doc__, body, headline(endings))
+    trusted = [e for e in endings if e.trusted and e.held]
+    result = headline(len(trusted), len(endings), sum(all(e.held) for e in trusted))
+    return page("strangers", "Strangers' rigs", __doc__, body, result)

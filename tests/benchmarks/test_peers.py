@@ -103,3 +103,27 @@ def test_arx_predicts_a_linear_plant_ahead_exactly(step):
     predicted = qube.arx([run], 4, 1)(run, 0.2)
     at = run.starts(20) + 20
     assert predicted == pytest.approx(run.y[at], abs=1e-6 * float(np.abs(y).max()))
+
+
+def test_the_carts_of_the_peers_move_as_the_plant_of_upright_does():
+    pytest.importorskip("numba")
+    from benchmarks.peers import carts
+
+    p = {"m_1": 0.17, "m_2": 0.15, "k_1": 40.0, "k_12": 36.0, "c_1": 0.3, "c_2": 0.2}
+    u = np.where(np.arange(600) < 300, 0.6, 0.0)
+    motion = up.simulate(up.chain(2)(**p), u=np.append(u, 0.0), seconds=1.2, dt=2e-3)
+    y = carts.moved(np.array([*p.values(), 0.0, 0.0, 0.0, 0.05]), np.zeros(2), u, 2e-3)
+    assert motion.to_pandas()[["x_1", "x_2"]].to_numpy()[:600] == pytest.approx(y, abs=1e-6)
+
+
+def test_output_error_finds_a_linear_plant_exactly():
+    """Two outputs of fourth order with common poles, free of noise."""
+    pytest.importorskip("numba")
+    from benchmarks.peers import carts
+
+    poles = np.poly([0.9 + 0.3j, 0.9 - 0.3j, 0.8 + 0.1j, 0.8 - 0.1j])[1:]
+    x = np.concatenate([poles, [0.0, 0.2, 0.1, 0.0], [0.0, 0.0, 0.1, 0.1]])
+    u = [np.repeat(np.random.default_rng(seed).normal(size=60), 10) for seed in range(3)]
+    first, second, third = (carts.Run(u=v, y=carts._linear(x, v), dt=0.01) for v in u)
+    predicted = carts.linear([first, second], output_error=True)(third)
+    assert min(carts.percent(third, predicted)) > 99.99
