@@ -65,6 +65,60 @@ def test_every_sine_is_a_point_whatever_rest_lies_between(pause: float) -> None:
     assert np.all(beyond(found) < 3)
 
 
+@pytest.mark.parametrize(("periods", "pause"), [(2, 8.0), (2, 20.0), (2.5, 12.0), (3, 8.0)])
+def test_two_periods_between_rests_are_a_point_without_being_asked(periods: float, pause: float) -> None:
+    """In a rest of 8 s the free swing falls to exp(-0.64 * 8) = 0.6 %, and by its end that is all that is missing."""
+    found = measured(log(command(FREQUENCIES, periods=periods, pause=pause)))
+    assert found.omega == pytest.approx(FREQUENCIES, rel=1e-6)
+    assert found.response[:, 0] == pytest.approx(exact(FREQUENCIES), rel=0.02 if pause < 10 or periods == 3 else 1e-3)
+    assert np.all(beyond(found) < 3)
+
+
+def test_errors_of_two_periods_hold_the_exact_response_at_95_percent() -> None:
+    u = command(FREQUENCIES[2:], periods=2, pause=12.0)
+    ratio = np.concatenate([beyond(measured(log(u, noise=0.05, seed=seed))) for seed in range(8)])
+    assert ratio.size == 64
+    assert np.mean(ratio < 3) >= 56 / 64
+    assert 0.15 < np.median(ratio) < 1.4  # ln 2 when neither too wide nor too narrow
+
+
+def test_rests_too_short_for_the_swing_say_so_and_their_errors_are_as_wide() -> None:
+    found = measured(log(command(FREQUENCIES, periods=2, pause=1.5)))
+    assert found.omega == pytest.approx(FREQUENCIES, rel=1e-6)
+    assert np.all(beyond(found) < 3)
+    (note,) = found.notes
+    assert "Rest longer between the sines" in note
+
+
+def test_a_drive_that_only_turns_comes_to_rest_elsewhere_and_is_measured_all_the_same() -> None:
+    """A motor with friction, 1/(s (s + 2)): where it stops after a sine, nothing pulls it back."""
+    numerator, denominator, _ = scipy.signal.cont2discrete(([1.0], [1.0, 2.0, 0.0]), DT)
+    u = command(FREQUENCIES, periods=2, pause=6.0)
+    u = u * np.where(np.arange(u.size) > 0, 1.0, 0.0)
+    y = scipy.signal.lfilter(np.ravel(numerator), denominator, u)
+    found = measured(Record(t=DT * np.arange(u.size), signals={"u": u, "y": y}, units={"u": "V", "y": "rad"}))
+    z = np.exp(1j * found.omega * DT)
+    assert found.omega == pytest.approx(FREQUENCIES, rel=1e-6)
+    assert found.response[:, 0] == pytest.approx(
+        np.polyval(np.ravel(numerator), z) / np.polyval(denominator, z), rel=1e-3
+    )
+
+
+def test_two_periods_are_told_apart_from_a_sweep_and_from_steps() -> None:
+    noise = 0.01 * np.random.default_rng(3).normal(size=200_000)
+    sines = command(FREQUENCIES, periods=2, pause=2.0)
+    # a pause counts as one period at most: two of three, and more where it is shorter
+    assert covered(DT * np.arange(sines.size), sines) > 0.65
+    assert covered(DT * np.arange(sines.size), sines + noise[: sines.size]) > 0.65
+    small = command(FREQUENCIES, periods=2, pause=2.0, size=np.geomspace(1.0, 0.1, 10))
+    assert covered(DT * np.arange(small.size), small) > 0.65
+    rest = np.zeros(500)
+    swept = np.concatenate([rest, *(np.concatenate([chirp(2.0, 60.0, 10.0, DT), rest]) for _ in range(4))])
+    steps = np.concatenate([rest, *([np.repeat([1.0, -1.0, 1.0, -1.0], 200), rest] * 4)])
+    for u in (swept, steps):
+        assert covered(DT * np.arange(u.size), u) == 0.0
+
+
 def test_one_log_of_sines_says_what_logs_of_one_sine_each_say() -> None:
     some = FREQUENCIES[3:8]
     together = measured(log(command(some, periods=30)))

@@ -2,7 +2,8 @@
 
 Nothing but the command says where a sine begins. Its upward crossings of zero lie evenly as long as the frequency
 stays; where two of them in a row leave that line, another sine has begun. Of each sine the periods of full amplitude
-whose transient has decayed are measured. What may be left of it then is a part of the error that is stated.
+whose transient has decayed are measured. What may be left of it then is a part of the error that is stated. Sines of
+two periods between rests (`rested`) settle in their rests instead.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from upright.errors import NotIdentifiable
 from upright.identification.frequency.detection import PER_PERIOD, Tone, detect, overtones, settled
 from upright.identification.frequency.response import FrequencyResponse
+from upright.identification.frequency.rested import measured, rested_sines
 from upright.records import Record
 from upright.signals.steps import smallest_step
 
@@ -81,8 +83,12 @@ def covered(t: Array, u: Array) -> float:
 
     0 for a sweep whose frequency grows within each stretch as much as from one to the next.
     """
-    stretches = sines_in(t, u)
-    if not stretches or _swept(stretches):
+    short = rested_sines(t, u)
+    held = [s for s in sines_in(t, u) if not any(s.first < r.last and r.first < s.last for r in short)]
+    if _swept(held):
+        held = []
+    stretches = sorted([*held, *short], key=lambda s: s.first)
+    if not stretches:
         return 0.0
     ends = np.array([0, *(k for s in stretches for k in (s.first, s.last)), t.size])
     gaps = (ends[1::2] - ends[0::2]).astype(np.float64)
@@ -106,13 +112,16 @@ def stepped_response(
     Raises
     ------
     NotIdentifiable
-        When no log holds three periods of a sine, or all are logged too slowly.
+        When no log holds three periods of a sine or two between rests, or all are logged too slowly.
     """
     points: list[_Measured] = []
     fast: list[float] = []
     for r in records:
         y, u = np.column_stack([r[n] for n in outputs]), r[command]
         step = smallest_step(u)
+        for short in rested_sines(r.t, u):
+            answer, drive, late = measured(r.t, y, u, short, quanta)
+            points.append(_Measured(y=answer, u=drive, late=late, lasting=math.inf, rested=True))
         for stretch in sines_in(r.t, u):
             if stretch.samples < PER_PERIOD + 0.5:
                 fast.append(stretch.omega)
@@ -159,12 +168,16 @@ def from_tones(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Measured:
-    """One frequency; `late` says that its transient had not decayed, `lasting` in which time [s] it falls to 1/e."""
+    """One frequency; `late` says that its transient had not decayed, `lasting` in which time [s] it falls to 1/e.
+
+    Where it is `rested`, the transient decays in the rest after it.
+    """
 
     y: Tone
     u: Tone
     late: bool
     lasting: float
+    rested: bool = False
 
 
 def _point(t: Array, y: Array, u: Array, stretch: HeldSine, quanta: Array, step: float) -> _Measured:
@@ -239,13 +252,18 @@ def _remainder(lines: Complex, noise: Array) -> tuple[Array, float]:
 
 def _notes(points: Sequence[_Measured], fast: Sequence[float]) -> list[str]:
     notes: list[str] = []
-    if late := [p for p in points if p.late]:
+    if late := [p for p in points if p.late and not p.rested]:
         names = _listed([p.y.omega for p in late])
         lasting = [p.lasting for p in late if math.isfinite(p.lasting)]
         longer = f"some {float(f'{4 * statistics.median(lasting):.1g}'):g} s longer" if lasting else "longer"
         notes.append(
             f"Not settled at {names} rad/s: what is left of the transient counts as error there. Hold each sine "
             f"{longer}, or let it grow slowly."
+        )
+    if rested := [p.y.omega for p in points if p.late and p.rested]:
+        notes.append(
+            f"Not settled at {_listed(rested)} rad/s: what still swings at the end of a rest counts as error "
+            "there. Rest longer between the sines, or hold each for more periods."
         )
     if fast:
         notes.append(f"Left out {_listed(sorted(fast))} rad/s: fewer than {PER_PERIOD} samples per period.")
@@ -265,8 +283,8 @@ def _nothing(fast: Sequence[float], command: str) -> str:
         )
     return (
         f"A response from sines needs three periods of each at constant frequency in the command, and '{command}' "
-        "holds no sine of three periods; name the column that drives with --command, hold each sine longer, or try "
-        "--kind sweep."
+        "holds no sine of three periods, and none of two between rests; name the column that drives with --command, "
+        "hold each sine longer, or try --kind sweep."
     )
 
 
