@@ -114,7 +114,7 @@ def _sine(t: Array, u: Array) -> tuple[float, float]:
     return 2 * math.pi * float(top.x) / span, 1 - float(top.fun)
 
 
-def measured(t: Array, y: Array, u: Array, sine: RestedSine, quanta: Array) -> tuple[Tone, Tone, bool]:
+def rested_answer(t: Array, y: Array, u: Array, sine: RestedSine, quanta: Array) -> tuple[Tone, Tone, bool]:
     """Answer to one sine, the sine, and whether its swing had not died away.
 
     By its own time, from its rest before to the end of that after, or by the whole log.

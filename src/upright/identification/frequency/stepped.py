@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upright.errors import NotIdentifiable
 from upright.identification.frequency.detection import PER_PERIOD, Tone, detect, overtones, settled
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.frequency.rested import measured, rested_sines
+from upright.identification.frequency.rested import rested_answer, rested_sines
 from upright.records import Record
 from upright.signals.steps import smallest_step
 
@@ -120,7 +120,7 @@ def stepped_response(
         y, u = np.column_stack([r[n] for n in outputs]), r[command]
         step = smallest_step(u)
         for short in rested_sines(r.t, u):
-            answer, drive, late = measured(r.t, y, u, short, quanta)
+            answer, drive, late = rested_answer(r.t, y, u, short, quanta)
             points.append(_Measured(y=answer, u=drive, late=late, lasting=math.inf, rested=True))
         for stretch in sines_in(r.t, u):
             if stretch.samples < PER_PERIOD + 0.5:
