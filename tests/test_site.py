@@ -51,7 +51,7 @@ def test_no_page_refers_to_another_machine_for_what_it_shows(built):
 def test_a_page_fits_its_screen_and_axe_finds_nothing(built, name, width, dark):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with opened(built / f"{name}.html", width=width, dark=dark) as (page, wrong):
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        until(page, f"document.documentElement.scrollWidth <= {width}")
         assert wrong == []
         found = axe.Axe().run(page).response["violations"]
         assert [(v["id"], [n["html"][:160] for n in v["nodes"]][:4]) for v in found] == []

@@ -21,7 +21,7 @@ from upright.rigs import Mode
 from upright.running.run import prepared
 
 RUNNING = RunState(phase="running", time=1.0, tick=1000, mode=Mode.HOST, counts=(3, -4))
-SOON = 10.0
+SOON = 60.0
 """Time after which what does not happen is a fault of the test [s]."""
 
 

@@ -96,17 +96,17 @@ class Student:
             self.page.locator(selector, has_text=re.compile(text)).first.wait_for(state="visible")
         except Exception as error:
             shown = {
-                each: self.page.locator(each).first.inner_text() for each in (selector, "#state", "#message", "#gate")
+                each: self.page.locator(each).all_inner_texts() for each in (selector, "#state", "#message", "#gate")
             }
             raise AssertionError(f"{selector} never read {text!r}: {shown}, {self.wrong}") from error
 
-    def until(self, wanted: Callable[[], bool]) -> None:
+    def until(self, wanted: Callable[[], bool], what: str = "it") -> None:
         """Wait for what the page shows nobody, in steps of the browser's clock."""
         for _ in range(PATIENCE // 50):
             if wanted():
                 return
             self.page.wait_for_timeout(50)
-        raise AssertionError("it did not come")
+        raise AssertionError(f"{what} did not come")
 
     def presses(self, selector: str) -> None:
         """Press a button, even one that is locked: it says why."""

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from urllib.request import HTTPRedirectHandler, build_opener
 
@@ -134,9 +134,20 @@ def test_a_class_at_work(roster, tmp_path):
     assert not list(tmp_path.glob("*/*.rows"))
 
 
-def children(process):
-    """Numbers of the processes that a process started."""
-    return [int(n) for task in Path(f"/proc/{process}/task").iterdir() for n in (task / "children").read_text().split()]
+def children(process, of=b""):
+    """Numbers of the processes that a process started, of those alone that have something in their command."""
+    numbers = []
+    for task in Path(f"/proc/{process}/task").iterdir():
+        with suppress(OSError):  # a thread that has ended meanwhile
+            numbers += (task / "children").read_text().split()
+    return [int(n) for n in numbers if of in command_of(n)]
+
+
+def command_of(process):
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:
+        return b""
 
 
 def lives(process):
@@ -155,8 +166,8 @@ def test_a_server_that_is_killed_leaves_no_process_of_its_class(roster, tmp_path
         text=True,
     )  # fmt: skip
     url = server.stdout.readline().strip()
+    assert until(lambda: children(server.pid, b"spawn_main"))
     begun = children(server.pid)
-    assert begun
     if running:
         with student(url, "bob") as bob:
             asks(bob, do="start")
@@ -176,9 +187,7 @@ def test_a_process_of_a_class_that_dies_is_told_to_everybody(roster, tmp_path):
     with open_bench([], [], tmp_path, roster=roster, fifo=False) as bench, student(bench.url, "bob") as bob:
         asks(bob, do="start")
         sees(bob, "running")
-        lanes = [n for n in set(children(os.getpid())) - before
-                 if b"spawn_main" in Path(f"/proc/{n}/cmdline").read_bytes()]  # fmt: skip
-        for each in lanes:
+        for each in set(children(os.getpid(), b"spawn_main")) - before:
             os.kill(each, signal.SIGKILL)
         assert "The process of the class has ended" in sees(bob, "stopped")["why"]
         asks(bob, do="rearm")

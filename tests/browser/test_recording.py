@@ -56,7 +56,7 @@ def played(rig, kind, folder, monkeypatch, lost=()):
     y, u = np.column_stack([record["psi"], record["theta"]]), record["u_applied"]
     desk = Played(y, u, model.per_unit, lost)
     recording.begin(desk)
-    assert desk.over.wait(12 * SOON)
+    assert desk.over.wait(2 * SOON)
     recording.end(folder / "run.mcap")
     return recording.described(), y, u
 
@@ -102,7 +102,7 @@ def test_a_coordinate_that_does_not_move_has_no_gain_and_a_file_that_cannot_be_s
     u = np.array(recording.request.samples)
     desk = Played(np.column_stack([u, np.zeros(u.size)]), u, rig.model.per_unit)
     recording.begin(desk)
-    assert desk.over.wait(12 * SOON)
+    assert desk.over.wait(2 * SOON)
     (tmp_path / "full").write_text("no folder", encoding="utf-8")
     recording.end(tmp_path / "full" / "run.mcap")
     drawn = recording.described()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,3 +47,14 @@ def until(page: Any, condition: str, frames: int = 1500) -> None:
         " look(); })"
     )
     assert held, condition
+
+
+def settled(page: Any, value: str, frames: int = 1500) -> Any:
+    """A value of the page once three frames leave it alone: what was just done may change it at the next one."""
+    last = page.evaluate(
+        f"new Promise((tell) => {{ let left = {frames}, same = 0, last; const look = () => {{"
+        f" const now = JSON.stringify({value}); same = now === last ? same + 1 : 0; last = now;"
+        " if (same === 3) tell(now); else if (left-- > 0) requestAnimationFrame(look); else tell(''); }; look(); })"
+    )
+    assert last, f"{value} never stands still"
+    return json.loads(last)

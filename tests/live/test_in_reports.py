@@ -59,7 +59,9 @@ def test_it_moves_inside_the_report(tmp_path):
     up.design(RIG, at="inverted", out=tmp_path)
     with opened(tmp_path / "design.html", width=1280) as (page, wrong):
         page.locator("iframe.live").scroll_into_view_if_needed()
-        frame = page.frames[1]
+        live = page.locator("iframe.live").content_frame
+        live.locator("#share").wait_for()  # it is loaded once it is seen, into a frame that is another one until then
+        frame = live.locator("html").element_handle().owner_frame()
         until(frame, "window.upright && upright.answered.length > 0 && upright.twin.k > 100")
         assert "rigs are stabilised" in frame.inner_text("#share")
         assert not frame.locator("h1").is_visible()

@@ -108,7 +108,7 @@ def test_a_run_fits_a_phone_and_axe_finds_nothing(written, width, dark):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with opened(written, width=width, dark=dark) as (page, wrong):
         until(page, "window.motion !== undefined")
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        until(page, f"document.documentElement.scrollWidth <= {width}")
         violations = axe.Axe().run(page).response["violations"]
         assert [(v["id"], [n["html"][:100] for n in v["nodes"]]) for v in violations] == []
         assert wrong == []
@@ -231,7 +231,7 @@ def test_a_run_that_was_only_measured_moves_alone(tmp_path):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     with opened(tmp_path / "run.html", width=360) as (page, wrong):
         until(page, "window.motion !== undefined")
-        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        until(page, "document.documentElement.scrollWidth <= 360")
         assert [v["id"] for v in axe.Axe().run(page).response["violations"]] == []
         assert page.locator("#rig g").count() == 1
         for k in (0, 60, 120):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.live.browser import opened
+from tests.live.browser import opened, settled
 from upright.report.html import write_html
 from upright.report.interactive.cells import Cells
 from upright.report.interactive.charts import Chart, ChartLine, ChartPanel
@@ -38,10 +38,10 @@ def written(tmp_path_factory):
 
 
 def told(page, name):
-    """What stands below the picture, and what a reader hears."""
-    figure = page.locator("figure").filter(has=page.locator(f'.read[aria-label="{name}"]'))
-    heard = figure.locator(".read").get_attribute("aria-valuetext")
-    assert figure.locator(".chart-reading").inner_text() == heard
+    """What stands below the picture, and what a reader hears, once what was just done has come to its end."""
+    read = f"document.querySelector('.read[aria-label=\"{name}\"]')"
+    heard, below = settled(page, f"[{read}.getAttribute('aria-valuetext'), {read}.nextElementSibling.textContent]")
+    assert below == heard
     return heard.replace("\u2212", "-")
 
 

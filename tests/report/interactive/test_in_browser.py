@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.live.browser import WIDTHS, opened, until
+from tests.live.browser import WIDTHS, opened, settled, until
 from tests.report.conftest import make_fit
 from upright.report.fit.chapter import chapter
 from upright.report.html import write_html
@@ -38,9 +38,10 @@ def traces(place=0):
 
 
 def show(page, place=0):
-    """Scroll to a figure and wait for its plots; where they are on the page."""
+    """Scroll to a figure and wait until its plots lie still: those above it may begin later, and grow."""
     page.evaluate(f"{SEEN}[{place}].scrollIntoView()")
     until(page, f"{traces(place)}?.plots[0].bbox.width > 0")
+    settled(page, f"{SEEN}[{place}].getBoundingClientRect()")
     return page.locator("figure:has(script.traces)").nth(place)
 
 
@@ -61,6 +62,7 @@ def test_the_cursor_tells_what_the_record_holds_at_that_time(written, fit):
         box = over.bounding_box()
         for share in (0.2, 0.47, 0.9):
             page.mouse.move(box["x"] + share * box["width"], box["y"] + 20)
+            until(page, f"Math.abs({traces(RELEASE)}.t[{traces(RELEASE)}.index] - {10 * share}) < 0.02")
             t, lines = told(page, RELEASE)
             i = int(np.argmin(np.abs(run.t - t)))
             assert t == pytest.approx(run.t[i], abs=1e-3)
@@ -99,7 +101,7 @@ def test_keys_move_the_cursor_sample_by_sample_and_zoom(written, fit):
         figure.locator(".panels").focus()
         for _ in range(4):
             page.keyboard.press("ArrowRight")
-        until(page, f"{shown}.heard.textContent !== ''")
+        until(page, f"{shown}.index === 3 && {shown}.heard.textContent !== ''")
         t, lines = told(page, RELEASE)
         assert t == pytest.approx(run.t[3], abs=1e-4)
         assert lines[0][1] == pytest.approx(run.y[3, 0], abs=1e-4)
@@ -139,7 +141,7 @@ def test_it_fits_a_phone_and_axe_finds_nothing(written, width, dark):
     with opened(written, width=width, dark=dark) as (page, wrong):
         for place in range(3):
             show(page, place)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        until(page, f"document.documentElement.scrollWidth <= {width}")
         found = axe.Axe().run(page, ".moving").response["violations"]
         assert [(v["id"], [n["html"][:100] for n in v["nodes"]]) for v in found] == []
         assert wrong == []
