@@ -11,6 +11,7 @@ import time
 import tracemalloc
 import urllib.error
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
 import pytest
@@ -152,6 +153,25 @@ def test_while_a_sweep_is_prepared_everybody_else_is_answered_and_a_stop_keeps_i
         assert one.note("state", state="running")["from"] == "sweep"
 
 
+def test_a_bench_that_closes_lets_nobody_wait_for_a_twin_that_is_being_compiled(rig, tmp_path, monkeypatch, capfd):
+    begun, go = threading.Event(), threading.Event()
+
+    def slow(*_):
+        begun.set()
+        assert go.wait(SOON)
+        return ""
+
+    monkeypatch.setattr("upright.browser.app.in_own_process", slow)
+    with ThreadPoolExecutor(1) as pool:
+        with Bench([rig], tmp_path, carry=ByHand()) as bench:
+            answer = pool.submit(got, bench, "rigs/furuta/twin.js")
+            assert begun.wait(SOON)
+            answer.add_done_callback(lambda _: go.set())  # compiled once nobody waits for it any more
+        status, _, text = answer.result(SOON)
+    assert (status, text) == (503, "The bench is closing.")
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.parametrize(
     "path",
     ["api", "api/rigs/nobody/runs", "rigs/nobody/twin.js", "assets/nothing.js", "assets/../live/drawing.js",
@@ -287,7 +307,7 @@ def test_whatever_is_sent_the_server_answers_on_and_the_drive_is_as_it_was(serve
 def test_a_flood_is_refused_and_a_stop_in_it_is_not(served):
     bench, station, _ = served
     with client(bench) as page:
-        for _ in range(90):
+        for _ in range(140):  # 100 of them refused would close it, and it lets 50 more pass in a second
             page.ask("release")
         page.ask("stop")
         assert "messages a second" in page.note("error")["sentence"]

@@ -6,8 +6,10 @@ rebinding): both are known by the headers Host, Origin and Sec-Fetch-Site, which
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
+from contextlib import suppress
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
@@ -52,10 +54,19 @@ class Guard:
 
     def __init__(self, app: App, *, hosts: frozenset[str], token: str = "", instructor: str = "") -> None:
         self._app, self._hosts, self._token, self._instructor = app, hosts, token, instructor
+        self._closing = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def close(self) -> None:
+        """Let nobody wait any more, whose answer takes a process some seconds; from any thread."""
+        if self._loop is not None:
+            with suppress(RuntimeError):  # it has ended
+                self._loop.call_soon_threadsafe(self._closing.set)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on what may pass."""
         if scope["type"] not in ("http", "websocket"):
+            self._loop = asyncio.get_running_loop()
             await self._app(scope, receive, send)
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
@@ -72,8 +83,35 @@ class Guard:
             scope[INSTRUCTOR] = _right(_cookie(headers, OF_CLASS), self._instructor)
             if scope["path"].startswith("/class") and not scope[INSTRUCTOR]:
                 await _refuse(scope, send, 403, "This is for the instructor, who has the address that was printed.")
+            elif scope["type"] == "http":
+                await self._answered(scope, receive, _with_headers(send))
             else:
-                await self._app(scope, receive, _with_headers(send))
+                await self._app(scope, receive, send)
+
+    async def _answered(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """The application's answer, or why there is none where the bench closes before it has begun."""
+        begun = False
+
+        async def sent(message: MutableMapping[str, Any]) -> None:
+            nonlocal begun
+            begun = True
+            await send(message)
+
+        async def answers() -> None:
+            await self._app(scope, receive, sent)
+
+        answer, closing = asyncio.create_task(answers()), asyncio.create_task(self._closing.wait())
+        try:
+            await asyncio.wait({answer, closing}, return_when=asyncio.FIRST_COMPLETED)
+            if begun or answer.done():
+                await answer
+            else:
+                answer.cancel()
+                await asyncio.wait({answer})
+                await _refuse(scope, send, 503, "The bench is closing.")
+        finally:
+            answer.cancel()
+            closing.cancel()
 
     def _from_here(self, headers: dict[str, str]) -> bool:
         origin = headers.get("origin")

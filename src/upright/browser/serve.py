@@ -61,10 +61,11 @@ class Bench:
         self.url = f"http://{address}:{port}/" + (f"?token={token}" if token else "")
         self.instructor_url = f"http://{address}:{port}/?instructor={instructor}" if instructor else ""
         names = {"127.0.0.1", "localhost", *((address, socket.gethostname().lower()) if lan else ())}
-        app: Any = Guard(
+        self._guard = Guard(
             application(self.stations, room), hosts=frozenset(f"{n}:{port}" for n in names), token=token,
             instructor=instructor,
         )  # fmt: skip
+        app: Any = self._guard
         self._server = uvicorn.Server(
             uvicorn.Config(
                 app, loop="asyncio", http="h11", ws="websockets-sansio", ws_max_size=LONGEST, ws_max_queue=8,
@@ -88,6 +89,7 @@ class Bench:
                 self.room.close()
             for station in self.stations:
                 station.close()
+            self._guard.close()
             self._server.should_exit = True
             if self._over.wait(10.0):  # it closes what it listens to itself, or is still to do it
                 self._socket.close()
