@@ -62,6 +62,7 @@ export class Bar {
     byId("state").dataset["state"] = phase ?? "lost";
     say(byId("state"), phase ? WORD[phase] : "Not connected");
     say(byId("late"), `${state?.late ?? 0}`);
+    for (const note of document.querySelectorAll<HTMLElement>(".writing")) note.hidden = !state?.writing;
     const from = byId<HTMLSelectElement>("from");
     const why = from.value === "hanging" ? (state?.hanging ?? "") : "";
     from.disabled = phase === "starting" || phase === "running";

@@ -84,8 +84,7 @@ export class Guide {
     const has = { pendulum: facts.hanging !== undefined, sets: facts.sets.length > 0, reference: tracked !== undefined };
     this.tasks = TASKS.filter((task) => has[task.needs]);
     byId("guide-toggle").hidden = !this.tasks.length;
-    this.shown = "";
-    this.draw();
+    this.draw(true);
   }
 
   private get task(): Task | undefined {
@@ -127,34 +126,35 @@ export class Guide {
     message("");
     this.kept.said[task.answer] = said;
     this.keep();
-    this.shown = "";
     this.draw();
     byId("guide-compare").focus();
   }
 
-  draw(): void {
+  /** `renewed`: what the rig is or does has changed, and with it the answer. */
+  draw(renewed = false): void {
     const open = this.kept.open && this.tasks.length > 0, task = this.task;
     byId("guide-toggle").setAttribute("aria-expanded", `${this.kept.open}`);
     byId("guide").hidden = !open;
+    if (renewed && !open) this.shown = "";
     if (!open || !task) return;
-    const said = this.kept.said[task.answer], now = JSON.stringify([task.answer, said]);
-    if (now === this.shown) return;
+    const said = this.kept.said[task.answer], now = JSON.stringify([task.answer, said, this.session.scene!.facts]), same = now === this.shown;
+    if (same && !renewed) return;
     this.shown = now;
     const at = this.tasks.indexOf(task), last = this.tasks.length - 1;
     say(byId("guide-part"), `${task.part}: question ${at + 1} of ${last + 1}`);
     say(byId("guide-ask"), this.filled(task.ask));
-    this.field(task, said);
+    if (!same) this.field(task, said); // what is being typed or pressed keeps its place
     byId("guide-after").hidden = said === undefined;
     lock(byId("guide-back"), at ? "" : "This is the first question.");
     lock(byId("guide-next"), at === last ? "This is the last question. The paper's fourth experiment, the large free swing, needs a rig that hangs free: upright lab." : said === undefined ? "Predict first." : "");
     if (said === undefined) return;
     this.answer = this.foresight.of(task.answer, this.moving, this.tilt, task.needs === "reference" ? this.step : 0);
     say(byId("guide-compare"), this.words(task, said));
-    byId<HTMLDetailsElement>("guide-details").open = false;
+    if (!same) byId<HTMLDetailsElement>("guide-details").open = false;
     say(byId("guide-why"), this.filled(task.why));
     say(byId("guide-source"), this.filled(task.source));
     say(byId("guide-do"), this.filled(task.do));
-    this.actions(task);
+    if (!same) this.actions(task);
     this.outcome();
   }
 

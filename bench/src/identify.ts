@@ -4,6 +4,7 @@ import { lock } from "./bar";
 import { drawChart } from "./chart";
 import { type Curve, drawCurves } from "./curves";
 import { byId, italic, make, say } from "./dom";
+import { ReportFrame } from "./frame";
 import { Recording } from "./recording";
 import type { Session } from "./session";
 import { Weighing } from "./weighing";
@@ -84,11 +85,16 @@ export class Identify {
   private identified: Identified | undefined;
   private facts: Facts | undefined;
   private picture: Picture | undefined;
-  /** Fit that is shown, and the log that is to be chosen once it is listed. */
+  /** Fit that is shown, the one that is on its way, and the log that is to be chosen once it is listed. */
   private shown = "";
+  private opening = "";
   private wanted = "";
   private timer = 0;
+  /** The look that goes on, and whether there is to be another one after it. */
+  private looks: Promise<void> | undefined;
+  private stale = false;
   private busy = "";
+  private readonly frame: ReportFrame;
   private readonly recording: Recording;
   private readonly weighing: Weighing;
   /** Whether a recording is shown, and not a fit; undefined until it is known whether there is one. */
@@ -109,7 +115,7 @@ export class Identify {
       });
     press("fit-begin", () => void this.begin());
     press("fit-interrupt", () => void this.order("DELETE", "fits"));
-    press("fit-report", () => this.report());
+    press("fit-report", () => this.frame.show(`/rigs/${encodeURIComponent(session.name)}/fits/${this.shown}.html`));
     press("fit-motions", record);
     for (const from of ["sweep", "step"] as const) press(`record-${from}`, () => session.steer({ do: "start", from }));
     press("weigh", () => void this.weigh());
@@ -123,11 +129,7 @@ export class Identify {
       this.recorded = this.weighed = false;
       void this.open(byId<HTMLSelectElement>("fit-list").value);
     });
-    byId<HTMLIFrameElement>("fit-frame").addEventListener("load", ({ currentTarget }) => {
-      (currentTarget as HTMLIFrameElement).contentWindow?.addEventListener("keydown", (event) => {
-        if (event.key === "Escape") session.stop();
-      }, { capture: true });
-    });
+    this.frame = new ReportFrame(byId("fit-frame"), () => session.stop());
     const redraw = () => {
       this.draw();
       this.recording.draw();
@@ -148,31 +150,50 @@ export class Identify {
   }
 
   /** What is known now; again soon while a fit goes on, and now and then while the screen is looked at. */
-  async show(): Promise<void> {
+  show(): Promise<void> {
+    this.stale = true;
+    return (this.looks ??= this.lookOn());
+  }
+
+  /** One look after the other: an older answer must not come to stand where a newer one did. */
+  private async lookOn(): Promise<void> {
     clearTimeout(this.timer);
+    try {
+      while (this.stale) {
+        this.stale = false;
+        await this.lookOnce();
+      }
+    } finally {
+      this.looks = undefined;
+    }
+    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now || this.records || !this.recording.over || (this.weighed && !this.weighing.over) ? SOON : LATER);
+  }
+
+  private async lookOnce(): Promise<void> {
     const answer = await fetch(`${this.address}/fits`).catch(() => undefined);
     const before = this.identified;
     if (this.records) [this.recorded, this.weighed] = [true, false];
     if (this.weighed) await this.weighing.look();
-    if (this.recorded === undefined) this.recorded = await this.recording.look();
-    else if (this.records || !this.recording.over) await this.recording.look();
+    if (this.recorded === undefined || this.records || !this.recording.over) {
+      const there = await this.recording.look();
+      this.recorded ??= there; // a fit may have been chosen meanwhile
+    }
     if (answer?.ok) {
       this.identified = (await answer.json()) as Identified;
       this.lists(before);
       const { now, failed, fits } = this.identified;
       if (now && now.looks !== (before?.now?.id === now.id ? before.now.looks : 0)) await this.look();
-      if (before?.now && !now) this.ended(failed, fits[0]);
-      else if (!this.shown && fits[0]) await this.open(fits[0].id);
+      if (before?.now && !now) await this.ended(failed, fits[0]);
+      else if (!this.shown && !this.opening && fits[0]) await this.open(fits[0].id);
     }
     this.state();
-    clearTimeout(this.timer);
-    if (this.visible) this.timer = window.setTimeout(() => void this.show(), this.identified?.now || this.records || !this.recording.over || (this.weighed && !this.weighing.over) ? SOON : LATER);
   }
 
   /** What may be pressed now. */
   state(): void {
     const { session, identified, busy } = this, now = identified?.now, chosen = byId<HTMLSelectElement>("fit-log").value;
-    lock(byId("fit-begin"), session.unsteerable || busy || (now ? "A log is being identified." : chosen ? "" : "There is no log yet: record one, or bring one."));
+    lock(byId("fit-begin"), session.unsteerable || busy || (now ? "A log is being identified." : chosen ? "" : session.state?.writing ? "The report of the last run is being written; then it can be identified." : "There is no log yet: record one, or bring one."));
+    byId("no-logs").hidden = !identified || identified.logs.length > 0 || session.state?.writing === true;
     byId("fit-record").hidden = session.scene?.kind !== "TWIN";
     for (const id of ["fit-motions", "record-sweep", "record-step"]) lock(byId(id), session.unsteerable || ({ stopped: "The rig is stopped; rearm it first.", starting: RUNS, running: RUNS } as Record<string, string>)[session.state?.state ?? ""] || "");
     byId("fit-interrupt").hidden = !now;
@@ -212,9 +233,9 @@ export class Identify {
     say(byId("fit-status"), text);
   }
 
-  private ended(failed: string, newest: Fitted | undefined): void {
+  private async ended(failed: string, newest: Fitted | undefined): Promise<void> {
+    if (!failed && newest) await this.open(newest.id); // what is said to be written is what stands there
     this.say(failed || "The fit is written.");
-    if (!failed && newest) void this.open(newest.id);
   }
 
   private lists(before: Identified | undefined): void {
@@ -230,7 +251,6 @@ export class Identify {
       if (fresh || logs.some((log) => log.id === chosen)) select.value = fresh?.id ?? chosen;
       this.wanted = "";
       select.disabled = logs.length === 0;
-      byId("no-logs").hidden = logs.length > 0;
       this.about();
     }
     if (JSON.stringify(before?.fits) !== JSON.stringify(fits)) {
@@ -296,9 +316,13 @@ export class Identify {
   }
 
   private async open(id: string): Promise<void> {
+    this.opening = id;
     const answer = await fetch(`/rigs/${encodeURIComponent(this.session.name)}/fits/${id}.json`).catch(() => undefined);
-    if (!answer?.ok) return;
-    this.facts = (await answer.json()) as Facts;
+    const facts = answer?.ok ? ((await answer.json()) as Facts) : undefined;
+    if (this.opening !== id) return; // another one was chosen meanwhile
+    this.opening = "";
+    if (!facts) return;
+    this.facts = facts;
     this.shown = id;
     byId<HTMLSelectElement>("fit-list").value = id;
     byId("fit-report-panel").hidden = true;
@@ -362,11 +386,5 @@ export class Identify {
     this.recording.draw();
     this.weighing.draw();
     void this.show();
-  }
-
-  private report(): void {
-    byId("fit-report-panel").hidden = false;
-    byId<HTMLIFrameElement>("fit-frame").src = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.html`;
-    byId("fit-report-panel").scrollIntoView();
   }
 }

@@ -51,6 +51,7 @@ const place = (): string[] => location.hash.split("/").slice(1).map(decodeURICom
 async function bench(): Promise<void> {
   const { rigs: all, class: ofClass } = await rigs(), known = all.find((rig) => rig.name === place()[0]);
   if (ofClass && !known) return classroom(all, ofClass);
+  document.body.classList.toggle("in-class", ofClass !== undefined);
   const name = (known ?? all[0])?.name;
   if (!name) return message("This bench has no rig; start it with a RIG.toml.");
   // The rig's kernel is compiled at the first request: what stops the rig does not wait for it.
@@ -84,7 +85,8 @@ async function bench(): Promise<void> {
     state: (before) => {
       const state = session.state;
       if (state?.state === "ended" && before && !before.verdict && state.verdict) message(state.verdict);
-      if (before?.state !== state?.state || before?.verdict !== state?.verdict) void runs.show();
+      const news = before?.state !== state?.state || before?.verdict !== state?.verdict || before?.writing !== state?.writing;
+      if (news) void runs.show();
       if (before?.state !== "starting" && state?.state === "starting") session.history.clear();
       bar.show();
       model.show();
@@ -92,7 +94,7 @@ async function bench(): Promise<void> {
       design?.gate();
       track.gate();
       if (identify.visible) {
-        if (before?.verdict !== state?.verdict || before?.state !== state?.state) void identify.show();
+        if (news) void identify.show();
         else identify.state();
       }
     },

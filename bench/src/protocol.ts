@@ -63,6 +63,8 @@ export interface State {
   hanging: string;
   /** Where the run, or the last one, began. */
   from: "held" | "hanging" | "motions" | "sweep" | "step";
+  /** Whether the report of a run is being written. */
+  writing: boolean;
 }
 
 export type ServerMessage =

@@ -36,6 +36,8 @@ export class Run {
   private speed: HTMLInputElement | undefined;
   private seconds: HTMLInputElement | undefined;
   private reason: HTMLInputElement | undefined;
+  /** What the fields of the next start were made for. */
+  private asked = "";
   /** What there is to say of the drawing. */
   note = "its drawing is being prepared";
   private drawn = -1;
@@ -156,15 +158,25 @@ export class Run {
     this.idle = IDLE;
   }
 
+  /** Fields of the next start. The drawing is there some time after the page, and what was typed until then stays. */
   private settings(known: boolean): void {
+    const { kind, coordinates, basis } = this.session.scene!, last = coordinates.at(-1)!, asked = JSON.stringify([kind, last, basis.level]);
+    if (asked !== this.asked) this.fields();
+    this.asked = asked;
+    if (kind !== "TWIN" || !known || this.tilt) return;
+    const { row, input } = field(`start, ${short(last.meaning)} away`, shownUnit(last.unit).unit, last.unit === "rad" ? TILT : ASIDE, last.unit === "rad" ? [-10, 10, 0.5] : [-5, 5, 0.1]);
+    this.tilt = input;
+    byId("next-title").after(row);
+  }
+
+  private fields(): void {
     const { kind, coordinates, basis } = this.session.scene!, rows: HTMLElement[] = [], last = coordinates.at(-1)!;
     const add = (...about: Parameters<typeof field>) => {
       const { row, input } = field(...about);
       rows.push(row);
       return input;
     };
-    const shown = shownUnit(last.unit);
-    if (kind === "TWIN" && known) this.tilt = add(`start, ${short(last.meaning)} away`, shown.unit, last.unit === "rad" ? TILT : ASIDE, last.unit === "rad" ? [-10, 10, 0.5] : [-5, 5, 0.1]);
+    this.tilt = undefined;
     this.seconds = add("stop after", "s", 600, [1, LONGEST, 1]);
     if (kind === "TWIN") this.speed = add("tap", `${last.unit}/s`, TAP, [-20, 20, 0.1]);
     this.reason = basis.level === "not trusted" ? make("input", { type: "text", maxlength: "200", value: this.reason?.value ?? "" }) : undefined;

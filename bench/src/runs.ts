@@ -1,6 +1,7 @@
 // Screen Runs: what has been run, its log as a file, its report.
 
 import { byId, make, say } from "./dom";
+import { ReportFrame } from "./frame";
 import type { Session } from "./session";
 
 interface Ran {
@@ -14,20 +15,17 @@ interface Ran {
 }
 
 export class Runs {
+  private readonly frame: ReportFrame;
+
   constructor(private readonly session: Session) {
-    // A report is a page of its own: the key that stops the rig is heard there too.
-    byId<HTMLIFrameElement>("report").addEventListener("load", ({ currentTarget }) => {
-      (currentTarget as HTMLIFrameElement).contentWindow?.addEventListener("keydown", (event) => {
-        if (event.key === "Escape") session.stop();
-      }, { capture: true });
-    });
+    this.frame = new ReportFrame(byId("report"), () => session.stop());
   }
 
   async show(): Promise<void> {
     const answer = await fetch(`/api/rigs/${encodeURIComponent(this.session.name)}/runs`).catch(() => undefined);
     if (!answer?.ok) return;
     const ran = (await answer.json()) as Ran[];
-    byId("no-runs").hidden = ran.length > 0;
+    byId("no-runs").hidden = ran.length > 0 || this.session.state?.writing === true;
     byId("runs-table").hidden = ran.length === 0;
     byId("runs-rows").replaceChildren(...ran.map((run) => {
       const files = make("td", { class: "files" }), when = this.when(run.started);
@@ -47,9 +45,7 @@ export class Runs {
   }
 
   private report(address: string, when: string): void {
-    byId("report-panel").hidden = false;
     say(byId("report-title"), `Report of the run of ${when}`);
-    byId<HTMLIFrameElement>("report").src = address;
-    byId("report-panel").scrollIntoView();
+    this.frame.show(address);
   }
 }

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import pytest
 
 from tests.browser.students import DESK, PHONE, Server, Student, student
+from tests.live.browser import until
 
 pytestmark = pytest.mark.slow
 NAMES = ("Änne Müller", "Bob", "Cleo", "Đorđe")
@@ -91,6 +92,10 @@ def test_a_student_chooses_their_name_and_sees_nobody_else(server, chromium):
     one.reads("#rig-name", "Cleo")
     assert one.page.url == f"{server.url}#/cleo/run"
     assert one.page.locator("#rigs a").all_inner_texts() == ["Not you? All names"]
+    one.page.click("#tab-identify")
+    one.reads("#identify .note", "Swing-up, first motions, sweep, step, weighing, .* are not offered here")
+    for what in ("#from", "#fit-motions", "#record-sweep", "#weigh", "#fit-use", "#filter"):
+        assert not one.page.locator(what).is_visible()
     one.page.goto(f"{server.url}#/class")
     one.reads("h1", "Who are you")
     assert one.wrong == []
@@ -102,16 +107,15 @@ def test_axe_finds_nothing_at_any_width(server, chromium, dark):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     for kind in (DESK, {"viewport": {"width": 390, "height": 844}}, PHONE):
         with instructor(chromium, server, dark=dark, **kind) as teacher:
-            teacher.page.wait_for_timeout(300)
             assert axe.Axe().run(teacher.page).response["violations"] == []
-            assert teacher.page.evaluate("document.documentElement.scrollWidth") <= kind["viewport"]["width"]
+            until(teacher.page, f"document.documentElement.scrollWidth <= {kind['viewport']['width']}")
             assert teacher.page.locator("#stop").is_visible()
         context = chromium.new_context(color_scheme="dark" if dark else "light", **kind)
         page = context.new_page()
         page.goto(server.url)
         page.get_by_role("link", name="Cleo").wait_for()
         assert axe.Axe().run(page).response["violations"] == []
-        assert page.evaluate("document.documentElement.scrollWidth") <= kind["viewport"]["width"]
+        until(page, f"document.documentElement.scrollWidth <= {kind['viewport']['width']}")
         context.close()
 
 

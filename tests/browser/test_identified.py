@@ -6,6 +6,7 @@ import io
 import json
 import os
 import random
+import re
 import shutil
 import zipfile
 import zlib
@@ -19,6 +20,7 @@ from tests.browser.students import DESK, Server, student
 from tests.browser.test_fits import ask
 from tests.browser.test_page import tab_to
 from tests.browser.test_served import client, got
+from tests.live.browser import settled, until
 from upright.browser.identify.work import identify_log
 from upright.browser.serve import Bench
 from upright.progress import silent
@@ -142,6 +144,7 @@ def identified(one, verdict):
     assert one.page.locator("#fit-pictures canvas").count() >= 1
     one.page.click("#fit-report")
     one.page.frame_locator("#fit-frame").locator("h1").wait_for()
+    one.page.wait_for_selector("#fit-frame:not(.unheard)")
 
 
 def shows_a_fit(page):
@@ -173,7 +176,7 @@ def test_a_run_is_identified_by_keyboard_alone(server, chromium):
         page.keyboard.press("Enter")
         one.reads("#fit-step", "evaluations")
         one.reads("#fit-live-says", r"After \d+ simulations the latest step explains ψ")
-        assert page.locator("#fit-live-pictures canvas").count() == 2
+        one.until(lambda: page.locator("#fit-live-pictures canvas").count() == 2, "a curve for each signal")
         tab_to(page, "#fit-interrupt")
         identified(one, "model")
         assert page.locator("#fit-rows th", has_text="inertia of disk and arm").count() == 1
@@ -200,9 +203,14 @@ def test_first_motions_are_recorded_and_identified_by_mouse_and_a_fit_can_be_int
         one.sees("ended")
         page.wait_for_function("n => document.querySelectorAll('#fit-log option').length > n", arg=before)
         assert page.locator("#fit-log").input_value() != "run"
+        written = []
+        page.route(re.compile(r"/fits/fit-\d+\.json$"), lambda route: written.append(route))
         page.click("#fit-begin")
         one.reads("#fit-step", "evaluations")
         page.click("#fit-interrupt")
+        one.until(lambda: written, "the request for the fit")
+        assert "is written" not in page.inner_text("#fit-status")  # not before it stands there
+        written.pop().continue_()
         identified(one, ".")
         one.leaves()
         assert one.wrong == []
@@ -293,8 +301,8 @@ def test_axe_finds_nothing_on_a_fit_and_nothing_is_clipped(fitted, chromium, dar
             shows_a_fit(one.page)
             present = axe.Axe().run(one.page).response["violations"]
             violations += [(kind["viewport"], v["id"], [n["html"][:100] for n in v["nodes"]]) for v in present]
-            assert one.page.evaluate("document.documentElement.scrollWidth") <= kind["viewport"]["width"]
+            until(one.page, f"document.documentElement.scrollWidth <= {kind['viewport']['width']}")
             spills = "[...document.querySelectorAll('#identify .panel')].filter(e => e.scrollWidth > e.clientWidth + 1)"
-            assert one.page.evaluate(f"{spills}.length") == 0
+            assert settled(one.page, f"{spills}.length") == 0
             assert one.foreign(fitted) == []
     assert violations == []

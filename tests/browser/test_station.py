@@ -47,9 +47,11 @@ def test_a_run_goes_from_idle_to_its_end_and_has_a_verdict(at_work):
     assert carry.go() == ""
     assert made.state == "running"
     assert (carry.orders[0].seconds, carry.orders[0].wall) == (5.0, True)
+    assert not made.described("operator")["writing"]
     carry.end()
     assert settled(made, lambda m: m.verdict)
     assert (made.state, made.why, made.verdict, made.last.late) == ("ended", "", "the verdict", 7)
+    assert not made.described("operator")["writing"]
     ask(made, "operator", "start")
     assert made.state == "starting"
 
@@ -70,11 +72,13 @@ def test_a_verdict_that_comes_when_the_next_run_has_begun_is_not_taken_for_its_o
         writing = made._thread
         carry.end()
         assert settled(made, lambda m: m.state == "ended")
+        assert made.described("operator")["writing"]
         ask(made, "operator", "start")
         carry.go()
+        assert made.described("operator")["writing"]  # still that of the first
         first.set()
         writing.join(SOON)
-        assert (made.state, made.verdict) == ("running", "")
+        assert (made.state, made.verdict, made.described("operator")["writing"]) == ("running", "", False)
         carry.end()
         second.set()
         assert settled(made, lambda m: m.verdict == "of the second")

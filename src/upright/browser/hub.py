@@ -72,7 +72,7 @@ class Hub:
         self._follow()
         station = self.station
         now_so = (station.state, station.why, station.lease.holder, station.verdict, station.last.phase,
-                station.last.mode, station.last.faults, station.hanging)  # fmt: skip
+                station.last.mode, station.last.faults, station.hanging, station.writing)  # fmt: skip
         now = time.monotonic()
         if now_so != self._shown or now - self._when >= SECOND:
             self._shown, self._when = now_so, now

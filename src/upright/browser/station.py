@@ -86,6 +86,8 @@ class Station:
         One of `IDLE`, `STARTING`, ...; why it is stopped, as a sentence.
     verdict : str
         Of the last run, as soon as its report is written.
+    writing : int
+        Reports of runs that are being written.
     last : RunState
         How the run goes, some twenty times a second.
     over : bool
@@ -125,7 +127,7 @@ class Station:
         self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
-        self._new_desk = desk
+        self._new_desk, self.writing = desk, 0
         self.recording: Recording | None = None
         self.last_use: LastUse | None = None
 
@@ -377,18 +379,22 @@ class Station:
         why = self._ended(end.stopped, end)
         if end.stopped == BY_HAND:  # the loop does not know by whose
             end = replace(end, stopped=why or "Ended by its operator.")
+        verdict = ""
         try:
             verdict = self._report(run, end, started)
         except UprightError as error:
             verdict = f"There is no report: {error}"
-        with self._lock:
-            if self.desk is desk:  # a report takes seconds, in which the next run may have begun
-                self.verdict = verdict
+        finally:
+            with self._lock:
+                self.writing -= 1
+                if self.desk is desk:  # a report takes seconds, in which the next run may have begun
+                    self.verdict = verdict
 
     def _ended(self, why: str, end: RunEnd | None = None) -> str:
         with self._lock:
             self.over = True
             if end is not None:
+                self.writing += 1
                 self.last = replace(self.last, late=end.late, tick=end.ticks, faults=end.faults)
             if self.state != STOPPED:
                 by_operator = self._ending and why == BY_HAND
@@ -412,7 +418,7 @@ class Station:
             "time": last.time, "tick": last.tick, "late": last.late, "mode": last.mode.name,
             "faults": [text for fault, text in SENTENCES.items() if fault in last.faults],
             "seconds": self.seconds, "verdict": self.verdict, "hanging": self.hanging,
-            "from": self.origin,
+            "from": self.origin, "writing": self.writing > 0,
         }  # fmt: skip
 
 
