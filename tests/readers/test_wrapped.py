@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from upright.errors import BadInput
 from upright.readers import read_source
 from upright.readers.source import Source
-from upright.readers.wrapped import unwrapped
+from upright.readers.wrapped import counting_on, unwrapped
 
 T = 0.002 * np.arange(4000)
 TURNS = np.round(16000 / (2 * np.pi) * (30 * T + 4 * np.sin(3 * T)))
@@ -56,3 +57,37 @@ def test_the_record_says_which_column_was_counted_on_and_how_often():
     assert f"'enc' is a counter of 16 bits and passed its end {passed} times; it is counted on here." in (
         record.provenance.notes
     )
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "unit", "step"),
+    [(np.uint32, "micros", 1e-6, 5000), (np.int16, "millis", 1e-3, 20), (np.uint16, "t_ms", 1e-3, 20)],
+)
+def test_a_clock_that_begins_again_goes_on(kind, name, unit, step):
+    """As C casts what it counts: of 6000 samples 5 ms or 20 ms apart."""
+    exact = 2**32 - 9_000_000 + step * np.arange(6000) + np.random.default_rng(3).integers(-1, 2, 6000)
+    clock = exact.astype(kind)
+    again = int((np.diff(clock.astype(float)) < 0).sum())
+    assert again >= 1
+    rows = "\n".join(f"{t} {k}" for t, k in zip(clock, range(6000), strict=True))
+    record = read_source(Source(file="log.txt", data=f"{name} u\n{rows}\n".encode()))
+    np.testing.assert_allclose(record.t - record.t[0], unit * (exact - exact[0]), atol=1.1 * unit)
+    often = "once" if again == 1 else f"{again} times"
+    assert f"Its clock of {8 * clock.itemsize} bits began again {often}; the time goes on." in record.provenance.notes
+
+
+@pytest.mark.parametrize(
+    "ticks",
+    [
+        np.concatenate([np.arange(0, 60_000, 20), np.arange(0, 60_000, 20)]),  # two runs
+        np.concatenate([np.arange(0, 60_000, 20), np.arange(59_000, 65_000, 20)]),  # a second goes back
+        np.arange(60_000, 0, -20),
+        0.5 + np.concatenate([np.arange(0, 65_536, 20), np.arange(4, 60_000, 20)]),
+    ],
+    ids=["two runs", "back by a second", "downwards", "fractions"],
+)
+def test_a_time_that_goes_back_otherwise_is_refused(ticks):
+    assert counting_on(ticks.astype(float))[1:] == (0, 0)
+    rows = "\n".join(f"{t} {k % 7}" for k, t in enumerate(ticks))
+    with pytest.raises(BadInput, match="increase"):
+        read_source(Source(file="log.txt", data=f"t_ms u\n{rows}\n".encode()))

@@ -19,6 +19,7 @@ from upright.readers.resolution import epoch_digits, exact_seconds, is_epoch, is
 from upright.readers.responses import is_frequency, response_columns
 from upright.readers.source import Source, TextTable
 from upright.readers.stamps import in_seconds
+from upright.readers.wrapped import counting_on
 from upright.records import Array, Record
 from upright.records.columns import stated_time_unit, stated_unit, time_scale
 from upright.records.record import CSV_MARK
@@ -162,7 +163,11 @@ def tabulated(source: Source, given: str | None = None) -> Record:
         notes.append("The log holds no time; its rows are counted.")
     elif not (time_scale(text.names[at]) or stated_time_unit(text.names[at])):
         notes.append(f"No column is named like a time; '{text.names[at]}' is the first and increases.")
-    t = converted(np.arange(table.shape[0]) if at is None else table[:, at], seconds)
+    ticks, bits, again = counting_on(np.arange(table.shape[0]) if at is None else table[:, at])
+    if again:
+        often = "once" if again == 1 else f"{again} times"
+        notes.append(f"Its clock of {bits} bits began again {often}; the time goes on.")
+    t = converted(ticks, seconds)
     if at is not None and is_epoch(t) and seconds == 1:
         rows = [line for line in text.body.split("\n") if line.strip()]
         cells = [row.split(text.delimiter)[at] for row in rows]
