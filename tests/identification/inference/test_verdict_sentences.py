@@ -383,7 +383,10 @@ def test_what_rests_on_an_assumed_number_is_not_used_before_that_is_measured() -
     assert both.headline == "No number can be used before l_cg is measured."
     assert both.reasons == ("J_p rests on m_p (assumed).", "b_2, J_p rest on l_cg (assumed).")
     apart = judged(estimates=e, assumptions=[assumed("m_p", J_p=0.5), assumed("l_cg", b_2=0.3)])[1]
-    assert apart.headline == "No number can be used before m_p and l_cg is measured."
+    assert apart.headline == "No number can be used before m_p or l_cg is measured."
+    every = [assumed(n, J_p=0.5, b_2=0.3) for n in ("m_p", "l_cg", "r")]
+    headline = judged(estimates=e, assumptions=every)[1].headline
+    assert headline == "No number can be used before m_p, l_cg and r are measured."
 
 
 def test_numbers_bent_by_a_dead_time_are_not_used() -> None:

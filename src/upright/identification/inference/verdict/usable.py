@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from upright.identification.inference.assumptions import resting
 from upright.identification.inference.intervals import VAGUE
@@ -111,8 +111,8 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
     elif reasons:
         answer, headline = "in part", f"These numbers can be used: {known}{_and(ratios)}"
         if not free:
-            missing = " and ".join(dict.fromkeys(a.name for n, a in moving.items() if n in sure))
-            headline = f"No number can be used before {missing} is measured.{_and(ratios)}"
+            missing = _missing(evidence, [n for n in sure if n in moving])
+            headline = f"No number can be used before {missing} measured.{_and(ratios)}"
             if not missing:
                 headline = "No number alone, only sums."
     else:
@@ -126,6 +126,14 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
     if any(e.status in ("poorly determined", "unseen") for e in estimated.values()):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
     return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+
+
+def _missing(evidence: Evidence, names: Sequence[str]) -> str:
+    """What has to be measured for the first of these numbers to be usable, with its verb; empty where none rests."""
+    needs = dict.fromkeys(tuple(a.name for a in evidence.assumptions if n in resting(a)) for n in names)
+    least = [need for need in needs if not any(set(other) < set(need) for other in needs)]
+    ways = [" and ".join(filter(None, [", ".join(need[:-1]), need[-1]])) for need in least]
+    return f"{' or '.join(ways)} {'are' if len(least[0]) > 1 else 'is'}" if ways else ""
 
 
 def _ratios(evidence: Evidence) -> dict[str, Estimate]:
