@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.study.draft.test_chain_tables import moved
 from upright.errors import BadInput
 from upright.identification.estimate import identify
 from upright.readers import inspect, read
@@ -75,6 +76,20 @@ def test_a_draft_explains_its_log_without_a_change(drafted):
     assert min(fit.runs[study.runs[0].label].fit_percent.values()) > 99
     assert fit.estimates["J_1"].value == pytest.approx(0.009, rel=0.02)
     assert fit.estimates["k_12"].value == pytest.approx(2.4, rel=0.02)
+
+
+@pytest.mark.slow
+def test_the_end_of_a_driven_log_tests_the_model_of_its_beginning(drafted):
+    """Two carts of a linear chain, sampled by its matrix exponential; the last third begins on the way."""
+    pushes = np.where((t := DT * np.arange(6000)) > 0.5, 3.0 * np.sign(np.sin(2.3 * t + 0.4 * t**1.5)), 0.0)
+    places = moved([2.0, 1.5], np.array([[500.0, -200], [-200, 200]]), [3.0, 2.0], pushes, [0, 0])
+    counted = {f"enc{i + 1}": np.round(METRE * x) for i, x in enumerate(places)}
+    _, study = drafted(t=t, u_volt=pushes, **counted)
+    assert [run.role for run in study.runs] == ["fit", "predict"]
+    fit = identify(study.model, study.runs)
+    assert min(fit.runs[study.runs[1].label].fit_percent.values()) > 99
+    assert fit.answers[0].answer == "yes"
+    assert fit.estimates["m_2"].value / fit.estimates["m_1"].value == pytest.approx(0.75, rel=0.01)
 
 
 def test_the_plant_may_be_named_against_the_guess(drafted):

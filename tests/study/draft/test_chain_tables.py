@@ -186,12 +186,15 @@ def test_a_draft_of_driven_carts_asks_for_what_a_newton_per_volt_moves():
     assert said["actuator"]["gain"] == {"value": "1 N/V", "assumed": True}
     assert said["drive"] == {"column": "u", "unit": "V"}
     assert said["sensors"]["x_1"]["counts_per_m"] == {"value": METRE, "assumed": True}
-    assert said["defaults"] == {"initial": {"x_1_dot": 0, "x_2_dot": 0}, "unknown": ["initial", "offset"]}
-    assert [r["label"] for r in said["runs"]] == ["log"]
+    assert said["defaults"] == {"unknown": ["initial", "offset"]}
+    start, tail = said["runs"]
+    assert (start["label"], start["role"], tail["label"], tail["role"]) == ("log start", "fit", "log tail", "predict")
+    assert start["initial"] == {"x_1_dot": 0, "x_2_dot": 0}
+    assert "initial" not in tail  # it begins on the way
     assert found.doubts[0] == "first"
     back = study(chain(drive=U, reversed_=True))[0]
     assert back["drive"]["sign"] == -1
-    assert "initial" not in back["defaults"]
+    assert "initial" not in back["runs"][0]
 
 
 def test_a_loops_output_in_counts_is_the_converters():
@@ -238,8 +241,9 @@ def test_of_a_held_cart_only_the_sum_of_its_springs_is_seen():
     assert given["m_2"]["assumed"]
     assert "MEASURE: with body 2 held, only k_1 + k_12 is seen" in text
     assert said["defaults"]["held"] == ["x_2"]
-    locked = study(chain(drive=U, locked=("x_2",), still=("x_1", "x_2")), record)[0]["defaults"]
-    assert locked == {"locked": ["x_2"], "initial": {"x_1_dot": 0}, "unknown": ["initial", "offset"]}
+    locked = study(chain(drive=U, locked=("x_2",), still=("x_1", "x_2")), record)[0]
+    assert locked["defaults"] == {"locked": ["x_2"], "unknown": ["initial", "offset"]}
+    assert locked["runs"][0]["initial"] == {"x_1_dot": 0}
 
 
 def test_a_spring_behind_a_hand_pulls_at_the_hand():

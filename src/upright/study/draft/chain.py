@@ -30,6 +30,7 @@ from upright.study.draft.tables import (
     assumed,
     command_unit,
     drive_table,
+    driven_runs,
     no_drive_table,
     parameters_left_at_zero,
     rig_toml,
@@ -80,8 +81,11 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[
     """What is recognised in the end, and the tables of a study about it."""
     plant = find(log.recognised.plant)
     start = _starts_of(record, log, plant)
-    several = len(log.windows) > 1
-    runs = [(f"{label} {i + 1}" if several else label, a, b, "fit") for i, (a, b) in enumerate(log.windows)]
+    runs = [(f"{label} {i + 1}", a, b, "fit") for i, (a, b) in enumerate(log.windows)]
+    if len(log.windows) == 1:
+        drive = None if log.loop else log.recognised.drive
+        runs = driven_runs(record, drive, log.windows[0], start.fastest, label)
+    tail = len(log.windows) == 1 and len(runs) > 1
     doubts = implausible(plant, start.numbers, scaled_by="the assumed 1 N (N m) per volt")
     if start.grounded is not None:
         doubts.append(
@@ -93,8 +97,8 @@ def chain_tables(record: Record, log: ChainLog, file: str, label: str) -> tuple[
         _parameters(log, plant, start),
         *_drive(log, plant, start),
         *(_sensor(log, plant, name) for name in log.recognised.columns),
-        _defaults(log, start),
-        *run_tables(file, runs),
+        _defaults(log, start, waits=not tail),
+        *_runs(log, file, runs, waits=tail),
     ]
     return replace(log.recognised, doubts=(*log.recognised.doubts, *doubts)), tables
 
@@ -217,15 +221,28 @@ def _sensor(log: ChainLog, plant: type[Plant], name: str) -> TomlTable:
     )
 
 
-def _defaults(log: ChainLog, start: ChainStarts) -> TomlTable:
+def _runs(log: ChainLog, file: str, runs: list[tuple[str, float, float, str]], *, waits: bool) -> list[TomlTable]:
+    tables = run_tables(file, runs)
+    if waits:
+        _waits(log, tables[0])
+    return tables
+
+
+def _waits(log: ChainLog, table: TomlTable) -> None:
+    """Bodies that rest at first."""
+    still = [n for n in log.still if n not in log.fixed]
+    if still:
+        table.key("initial", {f"{n}_dot": 0 for n in still}, "they wait for the first command")
+
+
+def _defaults(log: ChainLog, start: ChainStarts, *, waits: bool) -> TomlTable:
     table = TomlTable("[defaults]")
     if log.held:
         table.key("held", log.held, "their measured motion is prescribed")
     if log.locked:
         table.key("locked", log.locked)
-    still = [n for n in log.still if n not in log.fixed]
-    if still:
-        table.key("initial", {f"{n}_dot": 0 for n in still}, "they wait for the first command")
+    if waits:
+        _waits(log, table)
     unknown = ["initial"]
     if "ki =" in log.loop:
         unknown.append("input_offset")  # what the loop had summed up before the window

@@ -15,7 +15,6 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 
 import numpy as np
 
-from upright.identification.model.runs import FITTED_SHARE
 from upright.physics import Plant, find
 from upright.quantities import with_unit
 from upright.readers.inspection import Inspection
@@ -32,6 +31,7 @@ from upright.study.draft.tables import (
     assumed,
     command_unit,
     drive_table,
+    driven_runs,
     no_drive_table,
     parameters_left_at_zero,
     rig_toml,
@@ -238,9 +238,6 @@ def _carried(starts: PendulumStarts, plant: type[Plant]) -> PendulumStarts:
     )  # fmt: skip
 
 
-CHANGES, SWINGS = 2, 3.0
-"""Changes of a command, and swings, that a part of a log needs to say something by itself."""
-
 LONGER = 4.0
 """Times the length of its period that a pendulum may have: one of 76 m stands still, and explains its cart alone."""
 
@@ -353,20 +350,8 @@ def _runs(record: Record, recognised: Recognised, file: str, label: str) -> list
     split = start + 0.6 * (stop - start)
     if recognised.drive is None and recognised.frequency * (stop - start) / (2 * np.pi) > 12:
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
-    split = start + FITTED_SHARE * (stop - start)
-    if _acts_in_both(record, recognised, split):
-        return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
-    return run_tables(file, [(label, start, stop, "fit")])
-
-
-def _acts_in_both(record: Record, recognised: Recognised, split: float) -> bool:
-    """Whether a command moves the rig for several swings before `split` [s] as well as after it."""
-    if recognised.drive is None or len(recognised.columns) < 2:
-        return False
-    (start, stop), t, u = recognised.window, record.t, record[recognised.drive.name]
-    parts = [u[(t >= start) & (t < split)], u[(t >= split) & (t <= stop)]]
-    changes = [int(np.count_nonzero(np.diff(part) != 0)) for part in parts]
-    return min(changes) >= CHANGES and recognised.frequency * (stop - split) / (2 * np.pi) > SWINGS
+    moved = recognised.drive if len(recognised.columns) > 1 else None
+    return run_tables(file, driven_runs(record, moved, recognised.window, recognised.frequency, label))
 
 
 def _si(unit: str) -> float:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
+
 from upright import units
+from upright.identification.model.runs import FITTED_SHARE
 from upright.physics import Plant
 from upright.physics.statement import Coordinate
 from upright.quantities import with_unit
@@ -20,6 +23,9 @@ from upright.study.windows import digits_within
 PLACES = (*ANGLES, *LENGTHS)
 EFFORTS = ("V", "A", "N", "N m", "m/s^2", "rad/s^2")
 """Units of commands: a gain per mV would call a thousandth of it by the same number."""
+CHANGES, SWINGS, ACTS = 2, 3.0, 0.1
+"""Changes of a command, swings, and share of the command before, that the end of a log needs to test a model."""
+
 ROLES = {"fit": "fitted", "predict": "scored, never fitted"}
 
 
@@ -130,6 +136,22 @@ def as_logged(tables: Sequence[TomlTable], record: Record, scales: Mapping[str, 
                     table.lines[i] = "\n".join([f"unit = {toml(unit)}", *given] if unit else given)
                 elif line.startswith("offset ="):
                     table.lines[i] = line.replace(line.split()[2], toml(zero, 9), 1)
+
+
+def driven_runs(
+    record: Record, drive: Column | None, window: tuple[float, float], frequency: float, label: str
+) -> list[tuple[str, float, float, str]]:
+    """The window as one run; where a command moves the rig for several swings in both parts the last third is kept."""
+    start, stop = window
+    split = start + FITTED_SHARE * (stop - start)
+    if drive is not None:
+        t, u = record.t, record[drive.name]
+        parts = [u[(t >= start) & (t < split)], u[(t >= split) & (t <= stop)]]
+        changes = min(int(np.count_nonzero(np.diff(part) != 0)) for part in parts)
+        swings = frequency * (stop - split) / (2 * np.pi)
+        if changes >= CHANGES and swings > SWINGS and np.std(parts[1]) >= ACTS * np.std(parts[0]):
+            return [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")]
+    return [(label, start, stop, "fit")]
 
 
 def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list[TomlTable]:
