@@ -38,9 +38,10 @@ def traces(place=0):
 
 
 def show(page, place=0):
-    """Scroll to a figure and wait until its plots lie still: those above it may begin later, and grow."""
+    """Scroll to a figure and wait until its plots lie still; what begins in view may move it out of view."""
     page.evaluate(f"{SEEN}[{place}].scrollIntoView()")
     until(page, f"{traces(place)}?.plots[0].bbox.width > 0")
+    page.evaluate(f"{SEEN}[{place}].scrollIntoView()")
     settled(page, f"{SEEN}[{place}].getBoundingClientRect()")
     return page.locator("figure:has(script.traces)").nth(place)
 
