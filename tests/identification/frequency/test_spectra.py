@@ -123,7 +123,7 @@ def test_a_log_in_which_nothing_is_asked_is_refused() -> None:
     with pytest.raises(BadInput, match="not 'steps'"):
         told(still, kind="steps")
     noise = np.random.default_rng(0).normal(size=3000)
-    with pytest.raises(NotIdentifiable, match="no sine of three periods"):
+    with pytest.raises(NotIdentifiable, match="three periods of each in the command, or two between rests"):
         told(record(np.where(np.arange(3000) == 5, 1.0, 0.0), noise), kind="sines")
     for command in (noise, np.tile(noise[:1000], 2)):
         with pytest.raises(NotIdentifiable, match="repeats three times"):

@@ -282,9 +282,8 @@ def _nothing(fast: Sequence[float], command: str) -> str:
             "period; log faster."
         )
     return (
-        f"A response from sines needs three periods of each at constant frequency in the command, and '{command}' "
-        "holds no sine of three periods, and none of two between rests; name the column that drives with --command, "
-        "hold each sine longer, or try --kind sweep."
+        f"A response from sines needs three periods of each in the command, or two between rests, and '{command}' "
+        "holds no such sine; name the column that drives with --command, hold each sine longer, or try --kind sweep."
     )
 
 
