@@ -356,6 +356,9 @@ def _conclude(
     estimates = with_assumptions(with_ties(estimates, tied), assumed)
     late = None if brief or little or conventions else lateness(best)
     warnings += [late.sentence] if late else []
+    # a pole may depend on what the data cannot see
+    roots = {} if values or identifiable.hidden else _poles(best, assumed)
+    free = {at: there for at, there in roots.items() if at in problem.rig.plant.equilibria}
     answers = judge(
         Evidence(
             rig=problem.rig,
@@ -370,7 +373,7 @@ def _conclude(
             bent=late.bent if late else (),
             missing=tuple(force.sentence() for force in forces if force.essential),
             period=min(t.period for t in problem.tracks),
-            standing=None if brief or identifiable.hidden else standing(best, assumed),
+            standing=None if brief or identifiable.hidden else standing(best, assumed, free or None),
             judged=ahead,
             lost=best.lost,
             nothing=best.explains_nothing,
@@ -402,8 +405,7 @@ def _conclude(
         path=tuple(log.path),
         interrupted=end.interrupted,
         not_evaluated=skipped,
-        # a pole may depend on what the data cannot see
-        poles={} if values or identifiable.hidden else _poles(best, assumed),
+        poles=roots,
         assumptions=assumed,
         bands=bands,
         failed=bool(best.lost),

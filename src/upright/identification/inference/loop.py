@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from upright.errors import UprightError
 from upright.identification.inference.covariance import Optimum
-from upright.identification.inference.poles import poles, shared_values
-from upright.identification.model.fit import Assumption, Estimate
+from upright.identification.inference.poles import linear_plant, poles, shared_values
+from upright.identification.model.fit import Assumption, Estimate, Pole
 from upright.identification.model.grey_box import GreyBox
 from upright.identification.problem.normal_equations import to_one
 
@@ -37,17 +37,20 @@ class Standing:
     share: float
 
 
-def standing(best: Optimum, assumed: Sequence[Assumption] = (), *, seed: int = 0) -> Standing | None:
+def standing(
+    best: Optimum, assumed: Sequence[Assumption] = (), known: Mapping[str, tuple[Pole, ...]] | None = None, *,
+    seed: int = 0,
+) -> Standing | None:  # fmt: skip
     """How rigs within the intervals stand at the equilibrium that grows fastest; None where none grows or is driven.
 
     One state feedback, placed for the estimate, meets plants drawn from the covariance, to first order in it: A and B
-    move by their derivatives, the gain of the drive included.
+    move by their derivatives, the gain of the drive included. Poles of the free plant may be `known`, by equilibrium.
     """
     rig = best.problem.rig
     if len(rig.plant.inputs) != 1:
         return None
     values, names, C = shared_values(best)
-    by_equilibrium = poles(rig, values, names, C, best.quantile, assumed=assumed)
+    by_equilibrium = poles(rig, values, names, C, best.quantile, assumed=assumed) if known is None else known
     growing = {at: max((p.real for p in there), key=lambda e: e.value) for at, there in by_equilibrium.items()}
     at = max(growing, key=lambda a: growing[a].value, default="")
     if not names:  # every number that was to be estimated was left out
@@ -101,7 +104,7 @@ def placed(A: Array, b: Array, wanted: Array) -> Array | None:
 
 def driven_plant(rig: GreyBox, values: dict[str, float], at: str) -> tuple[Array, Array]:
     """State matrices with the drive's gain, and its loss per speed as damping."""
-    linear = rig.plant(**{n: values[n] for n in rig.plant.names()}).linear(at)
+    linear = linear_plant(rig.plant, tuple(values[n] for n in rig.plant.names()), at)
     A, B = linear.A.copy(), linear.B * values.get("actuator.gain", 1.0)
     place = [c.name for c in rig.plant.coordinates].index(rig.plant.inputs[0].on)
     A[:, 2 * place + 1] -= linear.B[:, 0] * values.get("actuator.slope", 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -15,6 +16,8 @@ from upright.identification.inference.assumptions import NEGLIGIBLE
 from upright.identification.inference.covariance import Optimum
 from upright.identification.model.fit import Assumption, Estimate, Pole
 from upright.identification.model.grey_box import GreyBox
+from upright.physics import Plant
+from upright.systems import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -132,10 +135,15 @@ def _of_one_sign(value: float, stderr: float, quantile: float, unit: str) -> Est
     return replace(plain, interval=(ends[0], ends[1]))
 
 
+@lru_cache(maxsize=256)
+def linear_plant(plant: type[Plant], values: tuple[float, ...], at: str) -> StateSpace:
+    """Linear model of a plant at an equilibrium, for the values of its parameters in their order."""
+    return plant(**dict(zip(plant.names(), values, strict=True))).linear(at)
+
+
 def _poles(rig: GreyBox, values: Mapping[str, float], at: str, held: frozenset[str]) -> NDArray[np.complex128]:
     """Poles with the actuator's loss per speed as damping of the coordinates that it drives, some coordinates held."""
-    plant = rig.plant(**{n: values[n] for n in rig.plant.names()})
-    linear = plant.linear(at)
+    linear = linear_plant(rig.plant, tuple(values[n] for n in rig.plant.names()), at)
     A = linear.A.copy()
     driven = {c.name: i for i, c in enumerate(rig.plant.coordinates)}
     for k, source in enumerate(rig.plant.inputs):
@@ -144,7 +152,7 @@ def _poles(rig: GreyBox, values: Mapping[str, float], at: str, held: frozenset[s
     if held:  # what holds them takes up the force in their rows
         free = [i for name, i in driven.items() if name not in held]
         states = [s for i in free for s in (2 * i, 2 * i + 1)]
-        mass = plant.mass_matrix(at)
+        mass = rig.plant(**{n: values[n] for n in rig.plant.names()}).mass_matrix(at)
         force = mass @ A[1::2]
         A = A[np.ix_(states, states)]
         A[1::2] = np.linalg.solve(mass[np.ix_(free, free)], force[np.ix_(free, states)])
