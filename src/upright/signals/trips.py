@@ -47,6 +47,9 @@ LEAST = 30
 STUCK = 0.02
 """Share of the largest speed below which a body may stick, where its drive cannot be judged."""
 
+APART = 1e-2
+"""Share of a column beside others, and of a target beside columns, below which squares lose digits."""
+
 ROWS = 800
 """Samples that enter the regression."""
 
@@ -144,14 +147,38 @@ class TripRegression:
         return out
 
     def explain(self, columns: Array) -> tuple[Array, Array]:
-        """Share of the variance that base and `columns` (..., p, T) leave unexplained, and slopes (..., p) of these."""
+        """Share of the variance that base and `columns` (..., p, T) leave unexplained, and slopes (..., p) of these.
+
+        By normal equations, which square what separates columns; by orthogonal rows where that, or what is left, is
+        little, and digits would be lost.
+        """
+        C = columns.reshape(math.prod(columns.shape[:-2]), *columns.shape[-2:])
+        along, pull = C @ self._basis, C @ self.rest
+        whole = C @ np.swapaxes(C, 1, 2)
+        G = whole - along @ np.swapaxes(along, 1, 2)
+        size, alone = (np.sqrt(np.maximum(np.diagonal(M, axis1=1, axis2=2), 0.0)) for M in (whole, G))
+        seen = alone > APART * size
+        scale = np.where(seen, 1 / np.where(seen, alone, 1.0), 0.0)
+        R = G * scale[..., None] * scale[:, None, :]
+        apart = seen.all(axis=1) & (np.linalg.det(R) > APART)
+        R[~apart] = np.eye(R.shape[-1])
+        slopes: Array = np.linalg.solve(R, (pull * scale)[..., None])[..., 0] * scale
+        squares = float(self.rest @ self.rest)
+        left = squares - np.sum(slopes * pull, axis=1)
+        poor = ~(apart & (left > APART * squares))
+        if poor.any():
+            left[poor], slopes[poor] = self._explain_apart(C[poor])
+        return np.asarray(left / self.variance).reshape(columns.shape[:-2]), slopes.reshape(columns.shape[:-1])
+
+    def _explain_apart(self, columns: Array) -> tuple[Array, Array]:
+        """What of the target's squares is left beside base and `columns` (cuts, p, T), and slopes (cuts, p)."""
         alone = self._aside(columns)
         size = _length(columns)
         acts = _length(alone) > 1e-4 * size
         scale = np.where(acts, 1 / np.where(acts, size, 1.0), 0.0)
         slopes = _slopes(alone * scale[..., None], self.rest) * scale
         left = self.rest - (slopes[..., None, :] @ alone)[..., 0, :]
-        return np.einsum("...t,...t->...", left, left) / self.variance, slopes
+        return np.einsum("...t,...t->...", left, left), slopes
 
     def misfit(self, cuts: NDArray[np.int64], *, late: bool, forward: bool) -> Array:
         """Shares (cuts,) of the variance left when the command acts before each of some samples only, or from it on.
