@@ -162,7 +162,7 @@ class TripRegression:
         R = G * scale[..., None] * scale[:, None, :]
         apart = seen.all(axis=1) & (np.linalg.det(R) > APART)
         R[~apart] = np.eye(R.shape[-1])
-        slopes: Array = np.linalg.solve(R, (pull * scale)[..., None])[..., 0] * scale
+        slopes = np.asarray(np.linalg.solve(R, (pull * scale)[..., None])[..., 0] * scale, dtype=np.float64)
         squares = float(self.rest @ self.rest)
         left = squares - np.sum(slopes * pull, axis=1)
         poor = ~(apart & (left > APART * squares))
