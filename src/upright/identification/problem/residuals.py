@@ -63,6 +63,9 @@ LEAST_MISSED = 0.01
 SHARED = 1000
 """Samples of a run, in the mean, from which on threads share the runs: they take a third of a millisecond."""
 
+REUSED = 4_000_000
+"""Numbers of a motion up to which its memory is kept for the next one; those of an hour's log are given back."""
+
 STEP = 1e-5
 """A perturbed number moves the weighted outputs by about this much, root mean square."""
 
@@ -115,7 +118,9 @@ class Problem:
         (number,) = shared_unknowns(replace(self.rig, parameters={sought.name: sought}))
         more = {p.name: p for p in (sought, *stated)}
         rig = replace(self.rig, parameters={**self.rig.parameters, **more})
-        return replace(self, rig=rig, unknowns=[*self.unknowns, number], steps=np.append(self.steps, 1e-6))
+        wider = replace(self, rig=rig, unknowns=[*self.unknowns, number], steps=np.append(self.steps, 1e-6))
+        wider._memory.update(self._memory)
+        return wider
 
     def value(self, x: Array) -> Array:
         """Values (sought,) or (sought, lanes) of coordinates."""
@@ -168,7 +173,19 @@ class Problem:
         d = self._setting(index, x)
         x0 = d.x0 if shift is None else d.x0 + shift
         self.evaluations += 1
-        return outputs(self.solver(index), self.tracks[index], d.values, x0, d.offsets, d.scales, samples=samples)
+        track, lanes = self.tracks[index], x0.shape[1] * x.shape[1]
+        size = samples * (len(x0) + track.u.shape[1]) * -(-lanes // VECTOR) * VECTOR
+        memory = None if track.ahead or size > REUSED else self._room(size)
+        return outputs(
+            self.solver(index), track, d.values, x0, d.offsets, d.scales, samples=samples, memory=memory
+        )  # fmt: skip
+
+    def _room(self, size: int) -> Array:
+        """Memory of this thread for so many numbers, used again: fresh memory takes as long as a motion does."""
+        thread = get_ident()
+        if thread not in self._memory or self._memory[thread].size < size:
+            self._memory[thread] = np.empty(size)
+        return self._memory[thread]
 
     def filtered(self, index: int, x: Array) -> tuple[Array, Array]:
         """Positions and speeds (W, outputs), as the sensors would show them, that a filter knows at the restarts."""
@@ -361,13 +378,11 @@ class Problem:
         d = self._setting(index, self.lanes(x, sought))
         self.evaluations += 1
         rows = len(d.x0) + track.u.shape[1]  # a loop records its commands as well
-        thread, most = get_ident(), n * rows * (sought.size + 16)
-        if thread not in self._memory or self._memory[thread].size < most:
-            self._memory[thread] = np.empty(most)
-        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=self._memory[thread])
+        memory = self._room(n * rows * (sought.size + 16))
+        motion = motions(self.solver(index), track, d.values, d.x0, samples=n, memory=memory)
         if sought.size:  # with the lanes that fill up a vector
             width = -(-motion.shape[2] // VECTOR) * VECTOR
-            motion = self._memory[thread][: n * motion.shape[1] * width].reshape(n, -1, width)
+            motion = memory[: n * motion.shape[1] * width].reshape(n, -1, width)
         kept = np.arange(min(track.first, n - 1), n)
         kept = kept if track.retained is None else np.flatnonzero(track.retained[:n])
         G = squares(motion, track.columns, track.y, d.offsets, track.weighting, d.scales, kept)

@@ -70,7 +70,7 @@ def motions(
 
 def outputs(
     solver: Simulator, track: Track, values: Mapping[str, float | Array], x0: Array, offsets: Array,
-    scales: Array | None = None, *, samples: int,
+    scales: Array | None = None, *, samples: int, memory: Array | None = None,
 ) -> Array:  # fmt: skip
     """Simulated outputs (samples, W, outputs, lanes) as the sensors show them.
 
@@ -82,12 +82,14 @@ def outputs(
         First states of the windows.
     offsets, scales : (outputs, lanes) arrays
         Sensor offsets and gains, the latter 1 when omitted.
+    memory : array, optional
+        Where the states of the motion are written, see `Simulator.run`.
     """
     if track.ahead:
         y = predicted(solver, track, values, offsets, scales, samples=samples)
         return y * track.ahead.weight[:samples, None, None, None]
     _, windows, lanes = x0.shape
-    out = motions(solver, track, values, x0, samples=samples)
+    out = motions(solver, track, values, x0, samples=samples, memory=memory)
     if windows == 1:
         y = np.empty((samples, 1, len(track.columns), lanes))
         for k, column in enumerate(track.columns):
