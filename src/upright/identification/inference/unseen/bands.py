@@ -47,7 +47,11 @@ MOST = 5.0
 
 FRICTION, GAIN = 0.13, 0.1
 """Standard deviations, relative, of friction and gain from log to log: friction of two runs of one day differed by
-13 %, and two of the public rigs drift by 10 to 20 % between days."""
+13 %, and two of the public rigs drift by 10 to 20 % between days.
+
+On a Furuta pendulum, two logs of which are fitted, they widen bands of free runs of two others by 4 to 15 times.
+Without them 68 % of the arm's samples and 69 % of the pendulum's lie inside in one of these, with them 99 % in both.
+"""
 
 CLOSE_TO_REST = 0.29
 """Root mean square of what friction at low speeds is larger by, relative: up to a half on logs of real rigs."""
