@@ -157,10 +157,10 @@ class TripRegression:
         whole = C @ np.swapaxes(C, 1, 2)
         G = whole - along @ np.swapaxes(along, 1, 2)
         size, alone = (np.sqrt(np.maximum(np.diagonal(M, axis1=1, axis2=2), 0.0)) for M in (whole, G))
-        seen = alone > APART * size
-        scale = np.where(seen, 1 / np.where(seen, alone, 1.0), 0.0)
+        visible = alone > APART * size
+        scale = np.where(visible, 1 / np.where(visible, alone, 1.0), 0.0)
         R = G * scale[..., None] * scale[:, None, :]
-        apart = seen.all(axis=1) & (np.linalg.det(R) > APART)
+        apart = visible.all(axis=1) & (np.linalg.det(R) > APART)
         R[~apart] = np.eye(R.shape[-1])
         slopes = np.asarray(np.linalg.solve(R, (pull * scale)[..., None])[..., 0] * scale, dtype=np.float64)
         squares = float(self.rest @ self.rest)
