@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from upright.identification.inference.covariance import Optimum, assess, student
 from upright.identification.model.fit import Estimate
 from upright.identification.model.grey_box import NOISE, GreyBox
-from upright.identification.problem.normal_equations import pseudo_inverse
+from upright.identification.problem.normal_equations import Normal, pseudo_inverse
 from upright.identification.problem.residuals import Problem, formulate
 from upright.identification.problem.unknowns import FAR, Unknown
 from upright.identification.search.descent import SearchLog, descend
@@ -125,7 +125,8 @@ def beside_bound(best: Optimum, place: int, quantile: float | None = None) -> Es
     plain, u = estimate(best, place, quantile), best.problem.unknowns[place]
     if not best.pinned[place]:
         return plain
-    _, (down, up) = _steps(best, place, best.quantile if quantile is None else quantile)
+    model = best.problem.normal(best.x)
+    _, (down, up) = _steps(best, place, best.quantile if quantile is None else quantile, model)
     low, high = float(best.x[place]) - down, float(best.x[place]) + up
     return replace(plain, interval=(math.exp(max(low, -700.0)), math.exp(min(high, 700.0))) if u.log else (low, high))
 
@@ -164,10 +165,12 @@ def profile(best: Optimum, place: int, plain: Estimate, quantile: float, log: Se
         When somebody interrupts: half a profile is no interval.
     """
     u, x = best.problem.unknowns[place], float(best.x[place])
+    model = best.problem.normal(best.x)
+    rise, steps = _steps(best, place, quantile, model)
     low, high = (
         x + sign * step if abs(end - x) < NARROW * step and end != wall else end
         for sign, step, end, wall in zip(
-            (-1, 1), _steps(best, place, quantile)[1], _ends(best, place, quantile, log),
+            (-1, 1), steps, _ends(best, place, model.cost, rise, steps, log),
             (best.problem.lower[place], best.problem.upper[place]), strict=True,
         )
     )  # fmt: skip
@@ -177,11 +180,12 @@ def profile(best: Optimum, place: int, plain: Estimate, quantile: float, log: Se
     return (low if math.isfinite(low) else plain.interval[0]), (high if math.isfinite(high) else plain.interval[1])
 
 
-def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[float, float]:
-    """Coordinates at which the refitted cost has risen enough, infinite where it never does."""
+def _ends(
+    best: Optimum, place: int, least: float, rise: float, steps: tuple[float, float], log: SearchLog
+) -> tuple[float, float]:
+    """Coordinates at which the refitted cost has risen enough from the `least`, infinite where it never does."""
     problem, x = best.problem, best.x
-    rise, steps = _steps(best, place, quantile)
-    u, model = problem.unknowns[place], problem.normal(x)
+    u = problem.unknowns[place]
     ends: list[float] = []
     for sign, step in zip((-1.0, 1.0), steps, strict=True):
         most = 2.0 if u.log else 100 * max(abs(float(x[place])), u.scale)
@@ -189,14 +193,13 @@ def _ends(best: Optimum, place: int, quantile: float, log: SearchLog) -> tuple[f
         def tell(cost: float, _x: Array, share: float = (sign + 1) / 2) -> None:
             log.tell(f"interval of {u.name}", share, cost, problem)
 
-        ends.append(_end(problem, x, place, model.cost, rise, sign * min(max(step, 1e-9 * u.scale), most), tell, log))
+        ends.append(_end(problem, x, place, least, rise, sign * min(max(step, 1e-9 * u.scale), most), tell, log))
     return ends[0], ends[1]
 
 
-def _steps(best: Optimum, place: int, quantile: float) -> tuple[float, tuple[float, float]]:
+def _steps(best: Optimum, place: int, quantile: float, model: Normal) -> tuple[float, tuple[float, float]]:
     """Rise of the cost at the ends of an interval, and the steps down and up to them in the quadratic model."""
     u, rise = best.problem.unknowns[place], allowed_rise(best, place, quantile)
-    model = best.problem.normal(best.x)
     curvature = _curvature(model.matrix, place, best)
     g = float(model.gradient[place]) if best.pinned[place] else 0.0
     # where the quadratic model has risen enough: 2 g s + c s^2 = rise
