@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.identification.twins import PENDULUM, rig, swing
 from upright.closed_loop import ClosedLoop
 from upright.errors import BadInput
 from upright.identification import Run
+from upright.identification.problem.residuals import formulate
 from upright.identification.problem.simulated import finely, law_of_loop
 from upright.laws import Law
 from upright.physics import CartPendulum, Pendulum
@@ -49,3 +51,17 @@ def test_a_prescribed_motion_passes_through_its_samples_at_the_law_s_rate():
     assert len(fine.q) == 4 * 49 + 1
     np.testing.assert_allclose(fine.q, (0.0025 * np.arange(4 * 49 + 1)) ** 2, atol=1e-12)
     assert finely(held, 1) is held
+
+
+@pytest.mark.parametrize("horizon", [None, 1.0])
+def test_a_simulated_run_stays_as_it_is_when_another_is_simulated_after_it(horizon):
+    """Memory is used again, and no answer lies in it: a pendulum of half the inertia swings otherwise."""
+    problem = formulate(rig(Pendulum, PENDULUM, {"J_p": 3e-3}), [swing(seconds=3.0, horizon=horizon)])
+    x, length = problem.start[:, None], problem.tracks[0].length
+    first = problem.simulate(0, x, length)
+    kept = first.copy()
+    wider = problem.beside(replace(problem.rig.parameters["b_2"], estimate=True))
+    other = wider.simulate(0, np.append(problem.start - 0.7, 1e-3)[:, None], length)
+    assert np.array_equal(first, kept)
+    assert not np.allclose(first, other)
+    assert np.array_equal(problem.simulate(0, x, length), kept)
