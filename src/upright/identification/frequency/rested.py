@@ -68,11 +68,18 @@ def rests(u: Array) -> list[slice]:
     still = np.concatenate([[False], off <= SURE * noise + 1e-9 * span, [False]])
     edges = np.flatnonzero(still[1:] != still[:-1]).reshape(-1, 2)
     edges = edges[np.diff(edges, axis=1)[:, 0] >= SHORTEST]
+    edges = edges[np.array([_stays(u[a:b], noise) for a, b in edges.tolist()], dtype=bool)]
     if not edges.size:
         return []
     moves = np.diff(np.concatenate([[0], edges.ravel(), [u.size]]))[::2]
     beside = np.maximum(moves[:-1], moves[1:]) * (edges[:, 0] > 0) * (edges[:, 1] < u.size)
     return [slice(int(a), int(b)) for (a, b), m in zip(edges, beside, strict=True) if b - a >= SHARE * m]
+
+
+def _stays(u: Array, noise: float) -> bool:
+    """Whether a command stays where it is; a sine that passes goes from one bound of its noise to the other."""
+    third = u.size // 3
+    return abs(float(u[:third].mean() - u[-third:].mean())) <= SURE / 2 * noise + 1e-9 * float(np.ptp(u))
 
 
 def rested_sines(t: Array, u: Array) -> list[RestedSine]:
