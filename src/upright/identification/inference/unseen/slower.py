@@ -32,6 +32,10 @@ SLOW = 0.1
 TRIED = 4
 """Perturbations of stiction that are tried at most, until one moves the outputs by about what others do."""
 
+LARGER = 30.0
+"""Times the usual perturbation, as slopes of second order allow: numbers that trade against each other magnify rounding
+errors of a forward difference."""
+
 ABOVE = 1.01
 """Stiction beside sliding friction where its effect is computed from both sides: at 1 it begins to act."""
 
@@ -80,7 +84,7 @@ def _products(best: Optimum, wider: Problem, z: Array) -> Array | None:
     more = np.arange(best.x.size, z.size)
     steps, near = wider.steps, _forward(best, wider, z, more)
     for _ in range(TRIED):
-        if near is None or wider.resize_steps(more, near[1]):
+        if near is None or wider.resize_steps(more, near[1] / LARGER**2):
             break
         steps, near = wider.steps, _forward(best, wider, z, more)
     wider.steps = np.asarray(2 * steps)
