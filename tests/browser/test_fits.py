@@ -136,7 +136,7 @@ def test_one_fit_at_a_time_and_an_interrupt_reaches_it(made):
 def test_of_a_brought_log_its_columns_tell_the_rig_unless_somebody_says_it_is_this_one(made, rig):
     fits, carry, folder = made
     fits.keep("swing.csv", b"1 2")
-    for of, expected in (("columns", None), (OWN, rig.rig_path)):
+    for of, expected in (("columns", None), (OWN, rig.file)):
         carry.answer = BadInput("nothing moves.")
         fits.begin("log-1", of, {"m_p": "1 kg"})
         assert settled(fits, lambda each: each.described()["now"] is None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,13 +23,12 @@ SEED = 3
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
     made = twin(tmp_path_factory.mktemp("bench"))
-    made.rig_path.write_text(made.rig_path.read_text("utf-8") + f"seed = {SEED}\n", encoding="utf-8")
-    return made
+    return replace(made, file=replace(made.file, seed=SEED))
 
 
 def test_stiffness_and_inertia_of_a_twin_s_body_are_those_of_a_line_and_hold_the_truth(rig):
     shown = []
-    last = json.loads(weigh_body(rig.rig_path, silent, shown.append))
+    last = json.loads(weigh_body(rig.file, silent, shown.append))
     assert [each["loadings"] for each in shown] == [1, 2, 3, 4, 5]
     assert ["line" in each for each in shown] == [False, True, True, True, True]
     assert last == shown[-1]

@@ -267,7 +267,8 @@ class Classroom:
         self._keeper.join(10.0)
 
     def _station(self, lane: int, student: Student, folder: Path) -> Station:
-        known = replace(self.rig, name=student.address, model=self.rig.model.replace(name=student.name))
+        model, file = self.rig.model.replace(name=student.name), replace(self.rig.file, seed=student.seed)
+        known = replace(self.rig, name=student.address, model=model, file=file)
         return Station(
             known, folder / student.address, carry=self._carry, report=self._write, swing_up=_no_swing_up,
             desk=partial(self._desk, lane),

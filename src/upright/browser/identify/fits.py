@@ -120,7 +120,7 @@ class Identifications:
                 raise BadInput("another log is being identified; wait, or interrupt it.")
             taken = [int(p.name.partition("-")[2]) for p in (self._folder / "fits").glob("fit-*")]
             key = f"fit-{max(taken, default=0) + 1}"
-            rig = self.came.rig_path if known["own"] or of == OWN else None
+            rig = self.came.file if known["own"] or of == OWN else None
             self._job = self._carry(
                 begin_identification, path, name, rig, dict(measured), self._folder / "fits" / key,
                 seconds=FITTING, grace=GRACE, progress=self._progress, show=self._show,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from upright.errors import BadInput, NotIdentifiable
@@ -17,7 +16,7 @@ from upright.identification.model.fit import Estimate
 from upright.progress import Progress
 from upright.records import Record
 from upright.report.symbols import with_error
-from upright.rigs.rigfile import read_rig_file
+from upright.rigs.rigfile import RigFile
 from upright.running.rig import model_and_truth
 
 SHOTS = 2
@@ -26,7 +25,7 @@ SHOTS = 2
 Facts = dict[str, Any]
 
 
-def weigh_body(path: Path, progress: Progress, show: Callable[[Facts], None]) -> str:
+def weigh_body(file: RigFile, progress: Progress, show: Callable[[Facts], None]) -> str:
     """Weigh the body of a twin; what is shown after each loading, and at the end, as JSON.
 
     Its pendulum or second body is off and its masses are unbolted, which nobody's hand does in a loop: the loadings are
@@ -37,7 +36,6 @@ def weigh_body(path: Path, progress: Progress, show: Callable[[Facts], None]) ->
     BadInput
         When the rig is no cart, no disk and no pendulum on one.
     """
-    file = read_rig_file(path)
     on = first_body(replace(model_and_truth(file)[1], seed=file.seed))
     logs, added, facts = dict[str, Record](), list[float](), Facts()
     for count in range(PIECES + 1):

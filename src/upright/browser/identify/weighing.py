@@ -47,7 +47,7 @@ class BodyWeighing:
             if self._job is not None:
                 raise BadInput("it is being weighed.")
             self._facts = {}
-            self._job = self._carry(begin_weighing, rig.rig_path, seconds=LONGEST, show=self._show)
+            self._job = self._carry(begin_weighing, rig.file, seconds=LONGEST, show=self._show)
         threading.Thread(target=self._run, args=(self._job,), name="weighing", daemon=True).start()
 
     def described(self) -> dict[str, Any] | None:

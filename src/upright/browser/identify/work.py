@@ -29,7 +29,7 @@ from upright.report.fit.tables import parameter_table
 from upright.report.html import tone, write_html
 from upright.report.symbols import number, percent, unit
 from upright.rig.makes import make_named
-from upright.rigs.rigfile import read_rig_file
+from upright.rigs.rigfile import RigFile
 from upright.running.rig import model_and_truth
 from upright.study.draft.from_record import study_of_record
 from upright.study.load import Study
@@ -42,15 +42,15 @@ BUCKETS, FEW = 300, 150
 
 
 def identify_log(
-    path: Path, name: str, rig: Path | None, measured: Mapping[str, str], folder: Path, progress: Progress,
+    path: Path, name: str, rig: RigFile | None, measured: Mapping[str, str], folder: Path, progress: Progress,
     show: Callable[[dict[str, Any]], None] | None = None,
 ) -> str:  # fmt: skip
     """Fit a log, and write fit.json, report.html and what the page shows into a folder; the verdict.
 
     Parameters
     ----------
-    rig : Path or None
-        RIG.toml of the rig that was logged; None where the columns are to tell what it was.
+    rig : RigFile or None
+        Of the rig that was logged, with the seed of its twin; None where the columns are to tell what it was.
     measured : mapping of str to str
         Numbers that somebody measured, with their units.
     show : callable, optional
@@ -90,13 +90,12 @@ def identify_log(
     return page.verdict
 
 
-def _study_of_rig(record: Record, path: Path, measured: Mapping[str, str]) -> Study:
+def _study_of_rig(record: Record, file: RigFile, measured: Mapping[str, str]) -> Study:
     """The study of a log of a rig that the bench knows.
 
     Of a model of the laboratory it is known what a scale and a ruler tell, and how well; of any other what its
     description says.
     """
-    file = read_rig_file(path)
     model, truth = model_and_truth(file)
     if file.known is not None:
         return study_of_record(record, model, known=measured)
