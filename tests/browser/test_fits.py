@@ -9,7 +9,7 @@ import pytest
 
 from tests.browser.runs import SOON, settled, twin
 from tests.browser.test_served import Client, client, got
-from upright.browser.identify.fits import LARGEST, LOOKS, MOST, OWN, Identifications, shown_name
+from upright.browser.identify.fits import LARGEST, LOOKS, MOST, OWN, Identifications, Shared, shown_name
 from upright.browser.identify.routes import WHO
 from upright.browser.serve import Bench
 from upright.errors import BadInput
@@ -19,7 +19,7 @@ class ByHand:
     """Stands for `Bounded`: gives what it is let give."""
 
     def __init__(self):
-        self.calls, self.answer, self.interrupted = [], '{"rows": 2, "seconds": 1.0, "columns": ["x"]}', 0
+        self.calls, self.ran, self.answer, self.interrupted = [], 0, '{"rows": 2, "seconds": 1.0, "columns": ["x"]}', 0
         self._over = threading.Event()
         self._over.set()
 
@@ -36,6 +36,7 @@ class ByHand:
 
     def run(self):
         assert self._over.wait(SOON)
+        self.ran += 1
         if isinstance(self.answer, Exception):
             raise self.answer
         return self.answer
@@ -131,6 +132,31 @@ def test_one_fit_at_a_time_and_an_interrupt_reaches_it(made):
     described = fits.described()
     assert (described["failed"], described["fits"]) == ("Nothing moves.", [])
     assert fits.picture() is None
+
+
+def test_fits_of_a_class_go_on_one_after_the_other_and_whoever_waits_may_leave(rig, tmp_path):
+    shared, carries = Shared(seconds=100.0), [ByHand() for _ in range(3)]
+    one, two, three = (
+        Identifications(rig, tmp_path / str(k), carry, shared) for k, carry in enumerate(carries)
+    )  # fmt: skip
+    for each, carry in zip((one, two, three), carries, strict=True):
+        each.keep("swing.csv", b"1 2")
+        carry.answer = BadInput("nothing moves.")
+        carry.hold()
+        carry.ran = 0
+        each.begin("log-1", "columns", {})
+    assert carries[2].bounds["seconds"] == 100.0
+    steps = [each.described()["now"]["step"] for each in (one, two, three)]
+    assert steps == ["starting", "waiting: 1 fit of the class before it", "waiting: 2 fits of the class before it"]
+    two.interrupt()
+    assert settled(two, lambda each: each.described()["now"] is None)
+    assert two.described()["failed"] == "It was taken back before it began."
+    assert three.described()["now"]["step"] == "waiting: 1 fit of the class before it"
+    for each, carry in ((one, carries[0]), (three, carries[2])):
+        carry.go()
+        assert settled(each, lambda each: each.described()["now"] is None)
+        assert each.described()["failed"] == "Nothing moves."
+    assert [carry.ran for carry in carries] == [1, 0, 1]
 
 
 def test_of_a_brought_log_its_columns_tell_the_rig_unless_somebody_says_it_is_this_one(made, rig):

@@ -7,6 +7,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from upright.browser.answers import sentence_of
 from upright.browser.identify.bounded import Bounded
 from upright.browser.identify.fitted import fitted_rig, fitted_rig_again
 from upright.browser.identify.tasks import begin_identification, begin_inspection
+from upright.browser.identify.turns import Turn, Turns
 from upright.browser.identify.weighing import BodyWeighing
 from upright.browser.rig import BenchRig
 from upright.browser.runs import listed
@@ -35,6 +37,25 @@ OWN, COLUMNS = "rig", "columns"
 Facts = dict[str, Any]
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shared:
+    """What bounds the identifications of a rig, or of all rigs of a class together.
+
+    Attributes
+    ----------
+    turns : Turns
+        One fit goes on, the others wait.
+    reading : Lock
+        Of whoever reads a log that was brought.
+    seconds : float
+        Time for a fit until it is interrupted [s].
+    """
+
+    turns: Turns = field(default_factory=Turns)
+    reading: threading.Lock = field(default_factory=threading.Lock)
+    seconds: float = FITTING
+
+
 class Identifications:
     """What can be identified at a rig.
 
@@ -42,6 +63,8 @@ class Identifications:
     ----------
     carry : callable
         Makes a `Bounded`.
+    shared : Shared, optional
+        What it shares with others of a class.
 
     Attributes
     ----------
@@ -49,11 +72,13 @@ class Identifications:
         The rig as its own RIG.toml describes it.
     """
 
-    def __init__(self, rig: BenchRig, folder: Path, carry: Callable[..., Bounded] = Bounded) -> None:
-        self.came, self._folder, self._carry = rig, folder, carry
+    def __init__(
+        self, rig: BenchRig, folder: Path, carry: Callable[..., Bounded] = Bounded, shared: Shared | None = None
+    ) -> None:
+        self.came, self._folder, self._carry, self._shared = rig, folder, carry, shared or Shared()
         self._lock = threading.Lock()
-        self._reading = threading.Lock()
         self._job: Bounded | None = None
+        self._turn: Turn | None = None
         self._now: Facts | None = None
         self._failed = ""
         self._picture: Facts = {}
@@ -70,7 +95,7 @@ class Identifications:
         name = shown_name(name)
         if len(data) > LARGEST:
             raise BadInput(f"'{name}' has more than {LARGEST >> 20} MB; cut it, or use `upright identify` on it.")
-        if not self._reading.acquire(blocking=False):
+        if not self._shared.reading.acquire(blocking=False):
             raise BadInput("another log is being read; try again when it is there.")
         try:
             folder = self._folder / "uploads"
@@ -90,7 +115,7 @@ class Identifications:
             replace_file(folder / f"{key}.json", json.dumps(facts).encode())
             return facts
         finally:
-            self._reading.release()
+            self._shared.reading.release()
 
     def logs(self) -> list[Facts]:
         """Logs that can be identified, those of the rig first, the newest first of each."""
@@ -123,8 +148,9 @@ class Identifications:
             rig = self.came.file if known["own"] or of == OWN else None
             self._job = self._carry(
                 begin_identification, path, name, rig, dict(measured), self._folder / "fits" / key,
-                seconds=FITTING, grace=GRACE, progress=self._progress, show=self._show,
+                seconds=self._shared.seconds, grace=GRACE, progress=self._progress, show=self._show,
             )  # fmt: skip
+            self._turn = self._shared.turns.join()
             self._failed, self._picture = "", {"explained": []}
             self._now = {
                 "id": key,
@@ -135,7 +161,7 @@ class Identifications:
                 "since": time.time(),
                 "looks": 0,
             }
-        threading.Thread(target=self._run, args=(self._job, dict(self._now)), name=key, daemon=True).start()
+        threading.Thread(target=self._run, args=(self._job, self._turn, dict(self._now)), name=key, daemon=True).start()
 
     def interrupt(self) -> None:
         """Let the fit that is on its way end with what it has.
@@ -146,15 +172,18 @@ class Identifications:
             When there is none.
         """
         with self._lock:
-            if self._job is None or self._now is None:
+            if self._job is None or self._turn is None or self._now is None:
                 raise BadInput("nothing is being identified.")
-            self._now["step"] = "ending with the best so far"
-            self._job.interrupt()
+            if not self._turn.leave_waiting():
+                self._now["step"] = "ending with the best so far"
+                self._job.interrupt()
 
     def described(self) -> Facts:
         """Logs, the fit that is on its way and those that are written, as JSON holds them."""
         with self._lock:
             now = None if self._now is None else {**self._now, "seconds": time.time() - self._now["since"]}
+            if now is not None and self._turn is not None and (before := self._turn.before):
+                now["step"] = f"waiting: {before} fit{'s' * (before > 1)} of the class before it"
             failed = self._failed
         return {"logs": self.logs(), "now": now, "failed": failed, "fits": self.listed()}
 
@@ -203,6 +232,8 @@ class Identifications:
     def close(self) -> None:
         """End what is on its way."""
         self.weighing.close()
+        if self._turn is not None:
+            self._turn.leave_waiting()
         if self._job is not None:
             self._job.kill()
 
@@ -222,9 +253,11 @@ class Identifications:
                 }
                 self._now["looks"] += 1
 
-    def _run(self, job: Bounded, now: Facts) -> None:
+    def _run(self, job: Bounded, turn: Turn, now: Facts) -> None:
         failed = ""
         try:
+            if not turn.wait():
+                raise BadInput("it was taken back before it began.")
             verdict = job.run()
             kept = {**{n: now[n] for n in ("id", "log", "of", "name", "since")}, "verdict": verdict}
             replace_file(self._folder / "fits" / now["id"] / f"{now['id']}.json", json.dumps(kept).encode())
@@ -234,8 +267,9 @@ class Identifications:
             failed = "It failed by a fault of the program; see what the server printed."
             raise
         finally:
+            turn.leave()
             with self._lock:
-                self._now, self._job, self._failed = None, None, failed
+                self._now, self._job, self._turn, self._failed = None, None, None, failed
 
 
 def shown_name(name: str) -> str:
