@@ -105,7 +105,7 @@ export class Identify {
   /** `chosen`: another fit is shown. */
   constructor(private readonly session: Session, record: () => void, private readonly chosen: () => void) {
     this.address = `/api/rigs/${encodeURIComponent(session.name)}`;
-    this.recording = new Recording(this.address, `/rigs/${encodeURIComponent(session.name)}/runs`);
+    this.recording = new Recording(this.address, (file) => session.file(`/rigs/${encodeURIComponent(session.name)}/runs/${file}`));
     this.weighing = new Weighing(this.address);
     const press = (id: string, act: () => void) =>
       byId(id).addEventListener("click", ({ currentTarget }) => {
@@ -115,7 +115,7 @@ export class Identify {
       });
     press("fit-begin", () => void this.begin());
     press("fit-interrupt", () => void this.order("DELETE", "fits"));
-    press("fit-report", () => this.frame.show(`/rigs/${encodeURIComponent(session.name)}/fits/${this.shown}.html`));
+    press("fit-report", () => this.frame.show(this.file("html")));
     press("fit-motions", record);
     for (const from of ["sweep", "step"] as const) press(`record-${from}`, () => session.steer({ do: "start", from }));
     press("weigh", () => void this.weigh());
@@ -126,6 +126,7 @@ export class Identify {
       if (file) void this.bring(file).finally(() => (input.value = ""));
     });
     byId("fit-list").addEventListener("change", () => {
+      if (this.session.unreadable) return this.say(this.session.unreadable);
       this.recorded = this.weighed = false;
       void this.open(byId<HTMLSelectElement>("fit-list").value);
     });
@@ -184,7 +185,7 @@ export class Identify {
       const { now, failed, fits } = this.identified;
       if (now && now.looks !== (before?.now?.id === now.id ? before.now.looks : 0)) await this.look();
       if (before?.now && !now) await this.ended(failed, fits[0]);
-      else if (!this.shown && !this.opening && fits[0]) await this.open(fits[0].id);
+      else if (!this.shown && !this.opening && fits[0] && !this.session.unreadable) await this.open(fits[0].id);
     }
     this.state();
   }
@@ -229,12 +230,17 @@ export class Identify {
     this.draw();
   }
 
+  /** Address of a file of a fit, the one that is shown unless another is meant. */
+  private file(ending: string, id = this.shown): string {
+    return this.session.file(`/rigs/${encodeURIComponent(this.session.name)}/fits/${id}.${ending}`);
+  }
+
   private say(text: string): void {
     say(byId("fit-status"), text);
   }
 
   private async ended(failed: string, newest: Fitted | undefined): Promise<void> {
-    if (!failed && newest) await this.open(newest.id); // what is said to be written is what stands there
+    if (!failed && newest && !this.session.unreadable) await this.open(newest.id); // what is said to be written is what stands there
     this.say(failed || "The fit is written.");
   }
 
@@ -317,7 +323,7 @@ export class Identify {
 
   private async open(id: string): Promise<void> {
     this.opening = id;
-    const answer = await fetch(`/rigs/${encodeURIComponent(this.session.name)}/fits/${id}.json`).catch(() => undefined);
+    const answer = await fetch(this.file("json", id)).catch(() => undefined);
     const facts = answer?.ok ? ((await answer.json()) as Facts) : undefined;
     if (this.opening !== id) return; // another one was chosen meanwhile
     this.opening = "";
@@ -346,7 +352,7 @@ export class Identify {
       make("span", {}, ...printed(name), ` ${meaning}`), make("input", { type: "text", name, maxlength: "60", placeholder: value }))));
     byId("fit-use").dataset["fit"] = this.shown;
     this.chosen();
-    byId<HTMLAnchorElement>("fit-file-link").href = `/rigs/${encodeURIComponent(this.session.name)}/fits/${this.shown}.fit`;
+    byId<HTMLAnchorElement>("fit-file-link").href = this.file("fit");
     byId("fit-pictures").replaceChildren(...facts.curves.map((curve) => {
       const how = curve.ahead ? `, ${curve.ahead} s ahead` : "";
       return this.pictured(curve, `, ${curve.role === "fit" ? "fitted" : "predicted"}${how}: ${curve.fit}`, `; ${curve.fit} explained`);

@@ -52,6 +52,7 @@ async function bench(): Promise<void> {
   const { rigs: all, class: ofClass } = await rigs(), known = all.find((rig) => rig.name === place()[0]);
   if (ofClass && !known) return classroom(all, ofClass);
   document.body.classList.toggle("in-class", ofClass !== undefined);
+  document.body.classList.toggle("instructs", ofClass?.instructor === true);
   const name = (known ?? all[0])?.name;
   if (!name) return message("This bench has no rig; start it with a RIG.toml.");
   // The rig's kernel is compiled at the first request: what stops the rig does not wait for it.
@@ -85,7 +86,7 @@ async function bench(): Promise<void> {
     state: (before) => {
       const state = session.state;
       if (state?.state === "ended" && before && !before.verdict && state.verdict) message(state.verdict);
-      const news = before?.state !== state?.state || before?.verdict !== state?.verdict || before?.writing !== state?.writing;
+      const news = before?.state !== state?.state || before?.verdict !== state?.verdict || before?.writing !== state?.writing || before?.operator !== state?.operator;
       if (news) void runs.show();
       if (before?.state !== "starting" && state?.state === "starting") session.history.clear();
       bar.show();

@@ -65,7 +65,7 @@ export class Recording {
   private recorded: Recorded | undefined;
   private built = "";
 
-  constructor(private readonly address: string, private readonly runs: string) {}
+  constructor(private readonly address: string, private readonly file: (name: string) => string) {}
 
   /** What is recorded so far; whether there is anything. */
   async look(): Promise<boolean> {
@@ -111,7 +111,7 @@ export class Recording {
     const late = unsettled ? ` ${unsettled === 1 ? "One has" : `${unsettled} have`} not settled, and count for less.` : "";
     say(byId("record-says"), (kind === "sweep" ? `${measured}, ${done}.${gapWords(gaps ?? [])}` : `${done}.`) + (over && kind === "sweep" ? late : "") + (over && run ? " It is kept as a run, and can be identified." : "") + (why ? ` ${why}` : ""));
     link.hidden = !over || !run || !!why || !points?.length;
-    link.href = `${this.runs}/${run}.frequency.csv`;
+    link.href = this.file(`${run}.frequency.csv`);
     byId("record-points").replaceChildren(...(points ?? []).map((point) => make("tr", {}, make("th", { scope: "row" }, significant(point.omega, 3)),
       ...point.dB.flatMap((dB, k) => [dB, point.deg[k] ?? null].map((value, i) => make("td", { class: "number" }, within(value, (i ? point.deg_error : point.dB_error)[k] ?? null)))))));
     if (kind !== "step") return;

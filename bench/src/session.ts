@@ -43,6 +43,18 @@ export class Session {
     return this.state?.operator === "another" ? ANOTHER : "";
   }
 
+  /** Why the files of this rig are not for the person at this page: in a class they are its operator's and the instructor's; "" when they are. */
+  get unreadable(): string {
+    const { classList } = document.body;
+    if (!classList.contains("in-class") || classList.contains("instructs") || this.state?.operator === "you") return "";
+    return `In a class, logs and reports of a twin are for its operator and the instructor; ${this.state?.operator === "another" ? "another page operates this one" : "take control first"}.`;
+  }
+
+  /** Address of a file of this rig; in a class with who wants it. */
+  file(path: string): string {
+    return document.body.classList.contains("in-class") ? `${path}?me=${encodeURIComponent(this.scene?.you ?? "")}` : path;
+  }
+
   stop(): void {
     if (!this.connection.send({ do: "stop" })) this.on.message(UNHEARD_STOP);
   }

@@ -14,6 +14,7 @@ from urllib.request import HTTPRedirectHandler, build_opener
 import pytest
 from websockets.sync.client import connect
 
+from tests.browser.test_served import got
 from tests.realtime.test_process import ours, until
 from upright.browser.classroom.overview import STATES
 from upright.browser.guard import OF_CLASS
@@ -103,6 +104,7 @@ def test_a_class_at_work(roster, tmp_path):
         ):  # fmt: skip
             scene = reads(bob, lambda note: note["type"] == "scene")
             assert (scene["name"], scene["title"]) == ("bob", "Bob")
+            neighbour = reads(anne, lambda note: note["type"] == "scene")["you"]
             for each in (anne, bob):
                 asks(each, do="start")
             sees(anne, "running")
@@ -125,10 +127,15 @@ def test_a_class_at_work(roster, tmp_path):
             sees(anne, "idle")
             assert bench.stations[2].state == "idle"  # nobody's twin is latched who did not run
             assert until(lambda: all(s.verdict for s in bench.stations[:2]), 300.0)
+            files = {end: f"rigs/bob/runs/run.{end}" for end in ("mcap", "html")}
+            for wanted, served in (("", 403), (f"?me={neighbour}", 403), (f"?me={scene['you']}", 200)):
+                assert [got(bench, path + wanted)[0] for path in files.values()] == [served] * 2
+            assert [got(bench, path, headers=teacher)[0] for path in files.values()] == [200] * 2
         logs = [read_log(tmp_path / name / "run.mcap") for name in ("anne-muller", "bob")]
     for log in logs:
         again = replay(log)
         assert again.identical
+        assert "seed" not in log.header.rig  # by which anybody could look into the twin
         assert len(again.rows) == len(log) > 100
     assert [event.kind for event in logs[1].events] == ["law", "fault"]
     assert not list(tmp_path.glob("*/*.rows"))

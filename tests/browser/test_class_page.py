@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -73,6 +74,16 @@ def test_an_instructor_sees_who_fell_and_stops_everybody(server, chromium):
         page.wait_for_selector("#state[data-state=stopped]")
         teacher.reads("#rig-name", "Bob")
         teacher.reads("#operator", "Another page operates")
+        for one in (bob, teacher):  # the log is there before its report
+            one.page.click("#tab-runs")
+            with one.page.expect_download() as coming:
+                one.page.get_by_role("link", name="Log").click()
+            assert Path(coming.value.path()).read_bytes()[1:6] == b"MCAP0"
+        bob.page.click("#control")
+        bob.reads("#runs-unreadable", "take control first")
+        assert bob.page.get_by_role("link", name="Log").count() == 0
+        bob.page.click("#control")
+        bob.reads("#control", "Give up")
         page.get_by_role("link", name="All students").click()
         teacher.reads("#summary", "1 fell, 1 stopped, 2 idle")
         for one in (anne, bob):

@@ -57,7 +57,7 @@ def got(bench, path, wait=SOON, **how):
     asked = urllib.request.Request(bench.url + path, **how)
     try:
         with urllib.request.urlopen(asked, timeout=wait) as answer:
-            return answer.status, answer.headers, answer.read().decode()
+            return answer.status, answer.headers, answer.read().decode(errors="replace")  # a log is no text
     except urllib.error.HTTPError as refused:
         text = b""
         with suppress(ConnectionError):  # who is sent away by the guard while sending may lose the sentence

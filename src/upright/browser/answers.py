@@ -16,6 +16,11 @@ def nothing() -> Response:
     return PlainTextResponse("There is nothing here.", status_code=404)
 
 
+def not_theirs() -> Response:
+    """That somebody else's files are not for them."""
+    return PlainTextResponse("In a class the files of a twin are for its operator and the instructor.", status_code=403)
+
+
 def report_page(path: Path) -> Response:
     """A report, which has a policy of its own."""
     headers = {"content-security-policy": "frame-ancestors 'self'"}

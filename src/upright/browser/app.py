@@ -18,12 +18,12 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from upright._version import __version__
-from upright.browser.answers import nothing, report_page, sentence_of
+from upright.browser.answers import not_theirs, nothing, report_page, sentence_of
 from upright.browser.classroom.overview import Overview
 from upright.browser.classroom.room import Classroom
 from upright.browser.guard import INSTRUCTOR
 from upright.browser.hub import Hub
-from upright.browser.identify.fits import Identifications
+from upright.browser.identify.fits import Identifications, Shared
 from upright.browser.identify.last_use import take_up
 from upright.browser.identify.routes import routes as identify_routes
 from upright.browser.messages import MOTIONS, ONE_STEP, SWEEP, ClientRequest, read
@@ -37,6 +37,8 @@ RATE = 40.0
 """Frames a second."""
 RATE_OF_CLASS = 20.0
 """The same of each student's rig: sixty of them are encoded and sent by one processor."""
+FIT_OF_CLASS = 180.0
+"""Time for a fit where others of a class may wait for theirs [s]; then it ends with the best so far."""
 PATIENCE = 10
 """Messages in a row that are not understood, or ten times as many that come too fast, before a connection is closed."""
 SWIFTEST = 50.0
@@ -70,7 +72,8 @@ def is_built() -> bool:
 
 def application(stations: Sequence[Station], room: Classroom | None = None) -> Starlette:
     """The bench of some rigs, which may be those of a class."""
-    fits = {station.rig.name: Identifications(station.rig, station.folder) for station in stations}
+    shared = None if room is None else Shared(seconds=FIT_OF_CLASS)
+    fits = {station.rig.name: Identifications(station.rig, station.folder, shared=shared) for station in stations}
     for station in stations if room is None else ():
         station.take_up(*take_up(station.rig, fits[station.rig.name], station.folder))
     hubs = {station.rig.name: Hub(station) for station in stations}
@@ -121,10 +124,19 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
             return nothing()
         return JSONResponse(await asyncio.to_thread(listed, hub.station.folder, hub.station.rig.name))
 
+    def readable(request: Request) -> bool:
+        """Whether the files of a rig are for whoever wants them: in a class its operator and the instructor have them."""
+        hub = hubs[request.path_params["name"]]
+        return (
+            room is None or bool(request.scope.get(INSTRUCTOR)) or hub.operated_by(request.query_params.get("me", ""))
+        )
+
     async def result(request: Request) -> Response:
         hub = hubs.get(request.path_params["name"])
         if hub is None:
             return nothing()
+        if not readable(request):
+            return not_theirs()
         return await asyncio.to_thread(_result, hub.station.folder, hub.station.rig.name, request.url.path)
 
     async def live(socket: WebSocket) -> None:
@@ -177,7 +189,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
             Route("/", page), Route("/assets/{name}", asset), Route("/api/rigs", rigs),
             Route("/api/rigs/{name}/runs", runs), Route("/rigs/{name}/twin.js", script),
             Route("/rigs/{name}/runs/{file}", result), WebSocketRoute("/live/{name}", live),
-            *identify_routes(hubs, fits, fixed="" if room is None else ONE_MODEL),
+            *identify_routes(hubs, fits, readable, fixed="" if room is None else ONE_MODEL),
             WebSocketRoute("/class", whole),
         ],
     )  # fmt: skip

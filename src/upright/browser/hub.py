@@ -55,6 +55,11 @@ class Hub:
         signed = self._signed(me.rpartition(".")[0])
         return hmac.compare_digest(*(text.encode(errors="replace") for text in (signed, me)))
 
+    def operated_by(self, me: str) -> bool:
+        """Whether that is who operates the rig."""
+        given, holder = (text.encode(errors="replace") for text in (me, self.station.lease.holder))
+        return bool(holder) and hmac.compare_digest(given, holder)
+
     def leave(self, outbox: Outbox) -> None:
         """A connection has ended."""
         who = self.clients.pop(outbox, "")

@@ -30,11 +30,15 @@ def write_report(run: PreparedRun, end: RunEnd, started: float) -> str:
     chapter = run_chapter(result)
     write_html(result.log_path.with_suffix(".html"), chapter)
     seconds = float(result.t[-1]) if result.t.size else 0.0
-    begun = "first motions" if run.request.exploration else "swing-up" if run.request.from_rest else "run"
-    what = run.request.what or begun
-    facts = {"what": what, "started": started, "seconds": seconds, "verdict": chapter.verdict}
-    replace_file(result.log_path.with_suffix(".json"), json.dumps(facts).encode())
+    list_run(run, started, seconds, chapter.verdict)
     return chapter.verdict
+
+
+def list_run(run: PreparedRun, started: float, seconds: float, verdict: str = "") -> None:
+    """Write what a list says of a run; without a verdict, its report is not written."""
+    begun = "first motions" if run.request.exploration else "swing-up" if run.request.from_rest else "run"
+    facts = {"what": run.request.what or begun, "started": started, "seconds": seconds, "verdict": verdict}
+    replace_file(run.order.log.with_suffix(".json"), json.dumps(facts).encode())
 
 
 def report_apart(run: PreparedRun, end: RunEnd, started: float) -> str:
@@ -44,7 +48,7 @@ def report_apart(run: PreparedRun, end: RunEnd, started: float) -> str:
 
 
 def listed(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Runs of a rig whose report is written, the newest first."""
+    """Runs of a rig, the newest first: those whose report is written, and in a class those whose log is."""
     out: list[dict[str, Any]] = []
     for path in sorted(folder.glob("run*.json")):
         if _STEM.fullmatch(path.stem):

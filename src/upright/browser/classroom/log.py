@@ -1,4 +1,4 @@
-"""The log and the report of a lane's run, once it is over: until then its rows stand in a file beside."""
+"""The log of a lane's run, once it is over: until then its rows stand in a file beside."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from upright.browser.runs import write_report
-from upright.errors import UprightError
+from upright.browser.runs import list_run
 from upright.laws import Law
 from upright.logs.layout import RunFile
 from upright.realtime.session import RunEnd, log_header
@@ -27,25 +26,16 @@ def row_of(coordinates: int) -> np.dtype[np.void]:
     return np.dtype([("tick", "<i8"), ("counts", "<i8", (coordinates,)), ("command", "<f8"), ("reference", "<f8")])
 
 
-def write_lane_report(
-    run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law, without: bool = False
-) -> str:
-    """Write the log of a run, then its report, unless it is to do without; the verdict.
-
-    Raises
-    ------
-    UprightError
-        Without the report.
-    """
+def write_lane_log(run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law) -> str:
+    """Write the log of a run and list it, before there is a report."""
     path = run.order.log
     if end.about is None or not end.ticks:
         path.unlink(missing_ok=True)
     else:
         _write_log(run, end, started, units, law)
+        list_run(run, started, end.seconds)
     rows_of(path).unlink(missing_ok=True)
-    if without:
-        raise UprightError(NO_REPORT)
-    return write_report(run, end, started)
+    return ""
 
 
 def _write_log(run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law) -> None:

@@ -17,7 +17,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from upright.browser.classroom.log import row_of, rows_of, write_lane_report
+from upright.browser.classroom.log import NO_REPORT, row_of, rows_of, write_lane_log
 from upright.browser.classroom.memory import (
     BY_HAND,
     CLOSE,
@@ -37,9 +37,9 @@ from upright.browser.classroom.memory import (
 from upright.browser.classroom.process import LanesOrder, run_lanes
 from upright.browser.classroom.roster import Student
 from upright.browser.rig import HARDWARE, NO_LAW, BenchRig
-from upright.browser.runs import in_own_process
+from upright.browser.runs import in_own_process, write_report
 from upright.browser.station import Station
-from upright.errors import BadInput
+from upright.errors import BadInput, UprightError
 from upright.laws import Law, as_values
 from upright.logs.replay import other_gains
 from upright.realtime import desk as usual
@@ -223,7 +223,8 @@ class Classroom:
         )  # fmt: skip
         self._runs: dict[int, _LaneRun] = {}
         self.pid = 0
-        self._writing, self._closing, self._gone = threading.Lock(), threading.Event(), threading.Event()
+        self._logging, self._writing = threading.Lock(), threading.Lock()
+        self._closing, self._gone = threading.Event(), threading.Event()
         self._write = report or self._report
         self.stations = tuple(self._station(lane, student, folder) for lane, student in enumerate(students))
         # the system ends the lanes' process with the thread that started it
@@ -337,13 +338,19 @@ class Classroom:
                 return f"The bench's server has not looked at it for {DEAF:g} s.", Fault.STOP
 
     def _report(self, run: PreparedRun, end: RunEnd, started: float) -> str:
-        """One after the other: processors are few, and whoever moves comes first."""
+        """One after the other: processors are few, and whoever moves comes first; logs wait for no report."""
         order = replace(run.order, law=as_values(self.law))
         kept = replace(run, law=NO_LAW, order=order)
-        with self._writing:
+        of_log = (kept, end, started, self._units, self.law)
+        with self._logging:
             if self._closing.is_set():  # no process is begun any more
-                return write_lane_report(kept, end, started, self._units, self.law, without=True)
-            return in_own_process(write_lane_report, kept, end, started, self._units, self.law)
+                write_lane_log(*of_log)
+            else:
+                in_own_process(write_lane_log, *of_log)
+        with self._writing:
+            if self._closing.is_set():
+                raise UprightError(NO_REPORT)
+            return in_own_process(write_report, kept, end, started)
 
     def _keep(self) -> None:
         process = get_context("spawn").Process(

@@ -12,7 +12,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from upright.browser.answers import nothing, report_page, sentence_of
+from upright.browser.answers import not_theirs, nothing, report_page, sentence_of
 from upright.browser.hub import Hub
 from upright.browser.identify.fits import COLUMNS, LARGEST, OWN, Identifications
 from upright.browser.identify.last_use import LastUse, keep_use
@@ -32,8 +32,22 @@ FILES = {"html": "report.html", "json": "facts.json", "fit": "fit.json"}
 Answering = Callable[[Request], Awaitable[Response]]
 
 
-def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixed: str = "") -> list[Route]:
-    """The addresses of some rigs; `fixed` is why they are known by their own descriptions alone, where that is so."""
+def routes(
+    hubs: Mapping[str, Hub],
+    fits: Mapping[str, Identifications],
+    readable: Callable[[Request], bool],
+    *,
+    fixed: str = "",
+) -> list[Route]:
+    """The addresses of some rigs.
+
+    Parameters
+    ----------
+    readable : callable
+        Whether the files of a request's rig are for whoever sends it.
+    fixed : str
+        Why rigs are known by their own descriptions alone, where that is so.
+    """
     adopting = set[str]()  # rigs for which a law is on its way, which takes a process some seconds
 
     async def described(request: Request) -> Response:
@@ -57,6 +71,8 @@ def routes(hubs: Mapping[str, Hub], fits: Mapping[str, Identifications], *, fixe
         path = None if own is None or end not in FILES else await asyncio.to_thread(own.file, key, FILES[end])
         if path is None:
             return nothing()
+        if not readable(request):
+            return not_theirs()
         if end == "html":
             return report_page(path)
         name = f"{request.path_params['name']}-{key}.json" if end == "fit" else None
