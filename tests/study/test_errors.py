@@ -94,6 +94,7 @@ WRONG = [
     ("window = [1.0, 9.0]", 'window = ["1 m", 9.0]', 24, "a length"),
     ("window = [1.0, 9.0]", "window = [1.0, 1.05]", 24, "at least 8 are needed"),
     ('role = "fit"', 'role = "fitt"', 25, "did you mean 'fit'?"),
+    ('role = "fit"', 'refit = "yes"', 25, "refit must be true or false"),
     ('role = "fit"', 'unknown = ["inital"]', 25, "did you mean 'initial'?"),
     ('role = "fit"', "unknown = 3", 25, "must be a list of names"),
     ('role = "fit"', 'shared = { fricton = "Monday" }', 25, "did you mean 'friction'?"),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from upright.errors import BadInput, nearest
 from upright.identification.checks.conventions import wrong_conventions
 from upright.identification.checks.outliers import ProvisionalFit, refit_without_outliers
+from upright.identification.checks.refit import as_tested, with_refit
 from upright.identification.checks.structure import with_proposal
 from upright.identification.inference.assumptions import assumption_sentences, assumptions, with_assumptions
 from upright.identification.inference.black_box import black_box
@@ -145,8 +146,12 @@ def identify(
 
 def _provisional(
     rig: GreyBox, runs: Sequence[Run], method: str, moments: Moments, log: SearchLog, *, watch: bool, near: Fit | None,
+    tested: Mapping[str, RunScore] | None = None,
 ) -> ProvisionalFit:  # fmt: skip
-    """Where the search ends; `moments` and the conventions of the `log` are those of all samples."""
+    """Where the search ends; `moments` and the conventions of the `log` are those of all samples.
+
+    `tested` holds how fitted runs were predicted before, by a fit without them.
+    """
     began = time.perf_counter()
     fitted = [with_trip_guesses(rig, run, moments) for run in runs if run.role == "fit"]
     _check(rig, fitted, method)
@@ -162,7 +167,7 @@ def _provisional(
     def conclude(end: Descent, *, values: bool = False) -> Fit:
         if not assessed or not np.array_equal(assessed[-1].best.x, end.x):
             assessed[:] = [_Assessed(best=assess(problem, end.x))]
-        fit = _conclude(rig, runs, assessed[-1], end, log, watch=watch, values=values)
+        fit = _conclude(rig, runs, assessed[-1], end, log, watch=watch, values=values, tested=tested or {})
         return replace(fit, method=method, seconds=time.perf_counter() - began)
 
     def whole() -> Fit:
@@ -178,7 +183,12 @@ def _provisional(
                 fit = conclude(other_valleys(problem, end, log))
         except KeyboardInterrupt:  # intervals and predictions may take long too; without them an answer is near
             return conclude(replace(end, interrupted=True))
-        return fit
+        return with_refit(fit, runs, refit)
+
+    def refit(all_runs: Sequence[Run], before: Fit) -> Fit:
+        fresh = SearchLog(progress=log.progress, conventions=log.conventions, look=log.look)
+        tested = {r.label: before.runs[r.label] for r in all_runs if r.role != before.runs[r.label].role}
+        return _provisional(rig, all_runs, method, moments, fresh, watch=False, near=before, tested=tested).whole()
 
     try:
         fit = conclude(optimum, values=True)
@@ -281,7 +291,7 @@ class _Assessed:
 
 def _conclude(
     requested: GreyBox, runs: Sequence[Run], assessed: _Assessed, end: Descent, log: SearchLog, *, watch: bool,
-    values: bool,
+    values: bool, tested: Mapping[str, RunScore],
 ) -> Fit:  # fmt: skip
     """Everything known about an optimum; of an interrupted search, or for `values` alone, only what takes no time.
 
@@ -344,6 +354,7 @@ def _conclude(
     bands = None if bands is None else reduce(with_force, forces, bands)
     ahead = None if best.lost else judged(problem, best.x)
     scores = _scores(assessed, scored, estimates, groups, bands, log, None if ahead is None else ahead.seconds)
+    scores = as_tested(scores, tested)
     skipped = _skipped(runs, watch=watch) if end.interrupted else ()
     if skipped:
         warnings.append(f"Not evaluated: interrupted. This concerns {', '.join(skipped)}.")
@@ -380,6 +391,7 @@ def _conclude(
             ties=tied,
             driven=is_driven(best),
             alike=alike,
+            refitted=[label for label in tested if scores[label].role != "fit"],
         )
     )
     return Fit(

@@ -92,7 +92,7 @@ class Study:
         for label in labels:
             if label not in {r.label for r in self.runs}:
                 raise BadInput(f"no run is called '{label}'; {nearest(label, [r.label for r in self.runs])}")
-        runs = tuple(replace(r, role="predict") if r.label in labels else r for r in self.runs)
+        runs = tuple(replace(r, role="predict", refit=False) if r.label in labels else r for r in self.runs)
         if labels and all(r.role == "predict" for r in runs):
             raise BadInput(f"holding out {', '.join(labels)} leaves no run to fit; hold out fewer.")
         return replace(self, runs=runs)
@@ -302,6 +302,7 @@ def read_run(study: Section, run: Section, label: str, plant: type[Plant], log: 
     return Run(
         label=label,
         role=role,
+        refit=run.flag("refit"),
         t=grid.t,
         u=u,
         y=np.column_stack([readings[n] for n in measured]),

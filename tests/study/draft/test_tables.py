@@ -108,7 +108,7 @@ def test_a_stated_unit_is_not_called_a_guess():
 def test_runs_have_their_window_and_a_rig_its_coarser_period():
     one, two = read(*run_tables("a.csv", [("up", 1.0, 2.5, "fit"), ("down", 3.0, 4.25, "predict")]))["runs"]
     assert one == {"label": "up", "file": "a.csv", "window": [1.0, 2.5], "role": "fit"}
-    assert two == {"label": "down", "file": "a.csv", "window": [3.0, 4.25], "role": "predict"}
+    assert two == {"label": "down", "file": "a.csv", "window": [3.0, 4.25], "role": "predict", "refit": True}
     rig = rig_toml("pendulum", find("pendulum"), log(0.002, x=np.arange(5)), 0.008)
     assert read(rig)["rig"] == {"plant": "pendulum", "period": "8 ms"}
     assert comments(rig) == {

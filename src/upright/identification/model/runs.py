@@ -44,6 +44,8 @@ class Run:
         Name in reports.
     role : {"fit", "predict"}
         Whether the estimator may see it.
+    refit : bool
+        Whether a run that was predicted is then fitted too, where the fitted ones leave a number undetermined.
     t : (N,) array
         Uniform time [s].
     u : (N, inputs) array
@@ -107,6 +109,7 @@ class Run:
     repeats: str | None = None
     source: str = ""
     record: tuple[float, float] | None = None
+    refit: bool = False
 
     @property
     def horizons(self) -> tuple[float, ...]:

@@ -26,7 +26,7 @@ EFFORTS = ("V", "A", "N", "N m", "m/s^2", "rad/s^2")
 CHANGES, SWINGS, ACTS = 2, 3.0, 0.1
 """Changes of a command, swings, and share of the command before, that the end of a log needs to test a model."""
 
-ROLES = {"fit": "fitted", "predict": "scored, never fitted"}
+ROLES = {"fit": "fitted", "predict": "scored by a fit without it"}
 
 
 def rig_toml(name: str, plant: type[Plant], record: Record, period: float = 0.0) -> TomlTable:
@@ -163,5 +163,7 @@ def run_tables(file: str, runs: Iterable[tuple[str, float, float, str]]) -> list
         table.key("file", file)
         table.key("window", [start, stop], "s", digits=digits_within(5, start, stop))
         table.key("role", role, ROLES[role])
+        if role == "predict":
+            table.key("refit", True, "then fitted too, where the fit without it leaves a number undetermined")
         tables.append(table)
     return tables

@@ -256,7 +256,7 @@ def _compared(
     scores: dict[str, Any] = {}
     test = first = None
     for name, study in models.items():
-        whole = replace(study.runs[place], role="predict")
+        whole = replace(study.runs[place], role="predict", refit=False)
         first, test = _halves(whole)
         rig = replace(study.model, substeps=fitted[name].substeps)
         f = fitted[name]

@@ -101,7 +101,7 @@ def _keys() -> str:
         file = "swing.csv"
         label = "tail"
         window = [30.0, 60.0]
-        role = "predict"        # scored, never fitted
+        role = "predict"        # scored, and not fitted
 
     A driven rig adds, for instance,
         [drive]

@@ -25,7 +25,8 @@ class Evidence:
     Numbers that are `bent` leave their intervals with a dead time of the drive that would explain the runs better.
     Runs that are `lost` run away at the numbers or as soon as one is moved; `nothing` says that the runs are missed by
     more than they vary, `ties` which pairs of numbers cannot be separated, `missing` in sentences what the runs show
-    and the model lacks, `alike` in one which other answers explain them as well.
+    and the model lacks, `alike` in one which other answers explain them as well. Runs that were `refitted` were
+    predicted first, without them, and count as predicted.
     """
 
     rig: GreyBox
@@ -47,3 +48,4 @@ class Evidence:
     ties: Sequence[Tie] = ()
     missing: Sequence[str] = ()
     alike: str = ""
+    refitted: Sequence[str] = ()

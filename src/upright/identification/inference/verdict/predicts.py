@@ -74,6 +74,11 @@ def predicts(evidence: Evidence) -> Judgement:
             f"Some horizons tell nothing: holding the measured speed predicts as well to within {MARGIN:.0f} % "
             f"({where}); predict further ahead."
         )
+    if evidence.refitted:
+        notes.append(
+            f"Fitted too, once a fit of the other runs had predicted this: {', '.join(evidence.refitted)}. The other "
+            "runs left a number undetermined; the numbers are now those of all runs."
+        )
     if evidence.memory > 0.05 * evidence.period and fitted:
         notes.append(
             f"The residuals are autocorrelated over about {evidence.memory:.2g} s, so a small effect is unmodelled. "
@@ -112,9 +117,10 @@ def predicts(evidence: Evidence) -> Judgement:
     near = evidence.judged is not None and not _tested(evidence.judged, evidence.runs)
     part = "in part" if blank or narrow or vague or still or near or evidence.missing else "yes"
     far = f" Outside what the fit has seen: {', '.join(outside)}." if outside else ""
+    also = " These were then fitted too." if evidence.refitted else ""
     headline = (
         f"{explains}It predicts {_ranges(evidence.runs, 'predict', still)} of runs it has not seen"
-        f"{_beside(evidence.runs)}.{far}"
+        f"{_beside(evidence.runs)}.{far}{also}"
     )
     beaten = _beaten(evidence.runs)
     if beaten:
