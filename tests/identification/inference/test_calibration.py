@@ -213,9 +213,24 @@ def test_a_band_is_the_root_of_two_variances_and_the_run_says_how_it_began(secon
     w = problem.tracks[0].weights[0]
     upto = round(seconds / DT) or N
     A = np.concatenate([w * slope[:upto, 1:], np.diag([problem.noise / u.prior[1] for u in own])])
-    b = np.concatenate([w * slope[:upto, 0], np.zeros(2)])
-    by_gain = slope[:, 0] - slope[:, 1:] @ np.linalg.lstsq(A, b, rcond=None)[0]
-    assert told.band["x_1"] == pytest.approx(2.0 * np.sqrt(0.01**2 + uncertain(by_gain)), rel=1e-4)
+    b = np.concatenate([np.outer(w * slope[:upto, 0], [1, 0, 0]), problem.noise * np.eye(2, 3, 1)])
+    follow = np.linalg.lstsq(A, b, rcond=None)[0]  # the gain, and an error of one sigma of each measured first state
+    by_gain = slope[:, 0] - slope[:, 1:] @ follow[:, 0]
+    began = np.sum((slope[:, 1:] @ follow[:, 1:]) ** 2, axis=1)
+    assert told.band["x_1"] == pytest.approx(2.0 * np.sqrt(0.01**2 + uncertain(by_gain) + began), rel=1e-4)
+
+
+@pytest.mark.parametrize("off", [0.02, 0.2, 0.5])
+def test_a_prediction_with_a_gain_that_is_one_sigma_off_misses_by_one_sigma_at_most(off: float) -> None:
+    """However badly that explains the run, and then its first state is taken as it was measured."""
+    run = rolled(1, role="predict")
+    run = replace(run, y=(0.1 + 0.2 * run.t + GAIN * (1 + off) / MASS * twice_integrated(command(1)))[:, None])
+    spread = {"x_1": (Spread(horizon=0.0, start=1e-9, end=1e-9),)}
+    bands = replace(PROMISE, spreads=spread, names=("actuator.gain",), covariance=np.array([[(GAIN * off) ** 2]]))
+    told = predict(KNOWN, cart(estimate=False), [run], bands=bands)["run 1"]
+    missed, sigma = np.abs(told.simulated - told.y)[:, 0], told.band["x_1"] / bands.quantile
+    assert np.all(missed <= 1.001 * sigma)
+    assert missed.max() > 0.9 * sigma.max()
 
 
 def test_a_band_of_a_restarted_run_widens_with_the_age_of_its_windows() -> None:

@@ -192,7 +192,7 @@ def _predict(
     seconds = _promised(run, bands)
     plain, problem, x = _foresee(rig, run, groups, progress, seconds)
     if bands is not None:
-        plain = banded(plain, bands, rig, run, groups, problem.values_at(x))
+        plain = banded(plain, bands, rig, run, groups, problem, x)
     missed = 100 - min(plain.fit_percent.values(), default=100.0)
     if missed <= 100 - SHORT:
         return plain

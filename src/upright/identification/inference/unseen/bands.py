@@ -208,12 +208,12 @@ def _blocks(best: Optimum) -> list[_Block]:
 
 def _missed(problem: Problem, met: Sensitivity, block: _Block, covariance: Array, x: Array, bands: Bands) -> Array:
     """What a block misses (all,) when the others predict it, in widths."""
-    sought, slope = problem.sought_in(block.run), met.slope
+    sought, slope, start = problem.sought_in(block.run), met.slope, met.slope[..., :0]
     if block.count == 1:  # a run that is left out still says how it began
-        slope = adapted(problem, block.run, slope, x)
+        slope, start = adapted(problem, block.run, slope, x)
     here = np.array_split(np.arange(len(met.error)), block.count)[block.number]
     error = met.error[here] + slope[here] @ block.step[sought]
-    variance = _variance(slope[here], covariance[np.ix_(sought, sought)])
+    variance = _variance(slope[here], covariance[np.ix_(sought, sought)]) + _squares(start[here])
     track = problem.tracks[block.run]
     width = _width(track, bands, met.age[here], variance)
     return np.concatenate([np.abs(error[:, k]) / width[c] for k, c in _signals(track)])
@@ -268,22 +268,31 @@ def _own(problem: Problem, index: int) -> NDArray[np.int64]:
     )  # fmt: skip
 
 
-def adapted(problem: Problem, index: int, slope: Array, x: Array) -> Array:
+def adapted(problem: Problem, index: int, slope: Array, x: Array) -> tuple[Array, Array]:
     """Slopes (N, outputs, sought) of a run whose own numbers follow, by least squares, as they do when it is predicted.
 
-    Those of its own numbers become zero. Samples before `score_from` alone are followed where that is set.
+    Those of its own numbers become zero. Samples before `score_from` alone are followed where that is set. Beside them,
+    what an error of one sigma of each thing that is known of its own numbers beforehand does (N, outputs, priors): it
+    decides the more, the worse the run is explained.
     """
     track, own = problem.tracks[index], _own(problem, index)
     if not own.size:
-        return slope
+        return slope, slope[..., :0]
     upto = len(slope) if not track.run.score_from else max(own.size, round(track.run.score_from / track.dt))
     weighted = np.einsum("ab,tbp->tap", track.weighting, slope[:upto])
     A = weighted[..., own].reshape(-1, own.size)
     _, prior = problem.prior_rows(x)
     P = prior[:, problem.sought_in(index)[own]]
-    follow = pseudo_inverse(A.T @ A + P.T @ P) @ (A.T @ weighted.reshape(-1, slope.shape[-1]))
+    P = P[P.any(axis=1)]
+    inverse = pseudo_inverse(A.T @ A + P.T @ P)
+    follow = inverse @ (A.T @ weighted.reshape(-1, slope.shape[-1]))
     follow[:, own] = np.eye(own.size)  # so that their own slopes become zero
-    return slope - slope[..., own] @ follow
+    return slope - slope[..., own] @ follow, slope[..., own] @ (problem.noise * inverse @ P.T)
+
+
+def _squares(moves: Array) -> Array:
+    """Variance (N, outputs) by independent moves (N, outputs, causes) of one sigma each."""
+    return np.sum(moves**2, axis=-1)
 
 
 def _variance(slope: Array, covariance: Array) -> Array:
@@ -335,7 +344,7 @@ def _spread(squares: Array, age: Array, horizon: float, least: float) -> Spread:
 
 def banded(
     plain: RunScore, bands: Bands, rig: GreyBox, run: Run, groups: Mapping[str, Mapping[str, float]],
-    own: Mapping[str, float],
+    estimated: Problem, at: Array,
 ) -> RunScore:  # fmt: skip
     """The score of a predicted run with the band of each signal.
 
@@ -347,8 +356,10 @@ def banded(
         With every number known.
     groups : mapping
         What groups of runs share, by label and name.
-    own : mapping of str to float
-        What was estimated from the run itself, by its key, see `Problem.key`.
+    estimated : Problem
+        That of the run alone: what is its own was estimated from it, with prior knowledge weighed as there.
+    at : array
+        The coordinates that were estimated.
     """
     parameters = {n: Parameter(name=n, value=ACTUATOR[n].default) for n in bands.names if n in ACTUATOR}
     parameters |= rig.parameters
@@ -359,9 +370,10 @@ def banded(
     uncertain = {n: replace(parameters[n], estimate=True) for n in names}
     uncertain |= {p.name: p for _, *pair in slow for p in pair}
     problem = formulate(replace(rig, parameters={**rig.parameters, **uncertain}), [run], thin=False, stated=groups)
+    problem.weigh_like(estimated)
     if run.filtered and plain.horizon is not None:
         problem = problem.ahead(plain.horizon)
-    track, x = problem.tracks[0], problem.place(own)
+    track, x = problem.tracks[0], problem.place(estimated.values_at(at))
     variance = np.zeros(plain.y.shape)
     age = np.full(len(plain.y), plain.horizon or 0.0)
     if not run.filtered:
@@ -369,7 +381,7 @@ def banded(
         met = sensitivity(problem, 0, x)
         age, variance = met.age, np.full(plain.y.shape, math.inf)
         if met.finite:
-            slope = adapted(problem, 0, met.slope, x)
+            slope, start = adapted(problem, 0, met.slope, x)
             uncertain_by = [*bands.names, *(stiction.name for _, stiction, _ in slow)]
             C = with_slow_friction(of_another_day(bands, rig, run), bands.names, rig, [each for each, *_ in slow])
             places = [uncertain_by.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
@@ -378,7 +390,7 @@ def banded(
             rows = np.array(places)[shared]
             value = problem.value(x)
             natural = np.array([1 / value[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
-            variance = _variance((slope * natural)[..., shared], C[np.ix_(rows, rows)])
+            variance = _variance((slope * natural)[..., shared], C[np.ix_(rows, rows)]) + _squares(start)
     width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
     return replace(
         plain, band={c: bands.quantile * w for c, w in width.items()}, beyond=beyond(rig, run, bands.reached)
