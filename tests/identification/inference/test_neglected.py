@@ -12,7 +12,6 @@ from upright.identification import Parameter, Run
 from upright.identification.estimate import identify
 from upright.identification.inference.covariance import assess
 from upright.identification.inference.neglected import OFFSET, Neglected, consider, with_force
-from upright.identification.inference.unseen.bands import FRICTION, MANY, of_another_day
 from upright.identification.model.bands import Bands
 from upright.identification.model.fit import Estimate, Fit
 from upright.identification.problem.residuals import formulate
@@ -125,21 +124,6 @@ def test_no_dry_friction_is_told_where_it_is_asked_for_or_not_there(pulled) -> N
     run = noisy(replace(driven("a", "fit", 0.0), y=x[:, [0, 2], 0]), 1e-3, seed=4)
     fit = identify(rig(Furuta, smooth, {"J_d": 0.006, "b_1": 6e-3}), [run])
     assert not any("dry friction that" in w for w in fit.warnings)
-
-
-def test_a_log_of_another_day_has_its_friction_uncertain_unless_many_logs_were_fitted() -> None:
-    known = rig(Furuta, FURUTA, {})
-    run = replace(driven("one", "predict", 0.0), source="b.csv (sha256 1); 0 to 6 s")
-    bands = Bands(
-        quantile=1.645, spreads={}, names=("J_d", "b_1"), covariance=np.zeros((2, 2)), logs=("a.csv (sha256 0)",)
-    )
-    C = of_another_day(bands, known, run)
-    assert C[1, 1] == pytest.approx((FRICTION * FURUTA["b_1"]) ** 2)
-    assert C[0, 0] == 0
-    same = replace(run, source="a.csv (sha256 0); 6 to 9 s")
-    assert not of_another_day(bands, known, same).any()
-    many = replace(bands, logs=tuple(f"{k}.csv" for k in range(MANY)))
-    assert not of_another_day(many, known, run).any()
 
 
 def test_a_number_is_considered_where_it_takes_its_share_of_the_cost_to_first_order() -> None:

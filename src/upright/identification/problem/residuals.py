@@ -122,6 +122,15 @@ class Problem:
         wider._memory.update(self._memory)
         return wider
 
+    def with_factors(self, index: int, names: Sequence[str]) -> Problem:
+        """The problem with factors of one run more, ``friction`` or ``gain``, its last."""
+        track = self.tracks[index]
+        run = replace(track.run, unknown=tuple(names), shared={})
+        more = run_unknowns(self.rig, index, run, track.start)
+        wider = replace(self, unknowns=[*self.unknowns, *more], steps=np.append(self.steps, np.full(len(more), 1e-6)))
+        wider._solvers.update(self._solvers)
+        return wider
+
     def value(self, x: Array) -> Array:
         """Values (sought,) or (sought, lanes) of coordinates."""
         log = np.array([u.log for u in self.unknowns], dtype=bool)

@@ -209,6 +209,13 @@ class Track:
             e = (y[skip:] - self.targets(len(y))[skip:]) @ self.weighting.T
         return e if self.retained is None else e * self.retained[skip : len(y), None, None]
 
+    def flat(self, each: Array) -> Array:
+        """Of samples (samples, W, ...) of every window, those of the run (N, ...), windows laid end to end.
+
+        The first of a window is the last of the one before, and left out.
+        """
+        return np.moveaxis(each[1:], 1, 0).reshape(-1, *each.shape[2:]) if self.windowed else each[:, 0]
+
     def targets(self, samples: int) -> Array:
         """Measured outputs (samples, W, outputs) that windows cut to `samples` are compared with."""
         if self.ahead:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from upright.identification.inference.ceiling import judged
 from upright.identification.inference.covariance import Optimum, student
 from upright.identification.inference.loop import matrix_root
+from upright.identification.inference.unseen.days import daily_moves, log_name, of_another_day
 from upright.identification.inference.unseen.reach import beyond, reached
 from upright.identification.inference.unseen.slower import considered, slow_friction
 from upright.identification.model.bands import LEVEL, NORMAL, Bands, SlowFriction, Spread
@@ -34,7 +35,6 @@ from upright.identification.model.runs import LEAST_RUN, Run
 from upright.identification.problem.normal_equations import finite, pseudo_inverse, slopes, to_one
 from upright.identification.problem.residuals import ROUNDING, Problem, formulate
 from upright.identification.problem.tracks import Track
-from upright.identification.problem.unknowns import friction_names
 from upright.physics.actuator import ACTUATOR
 
 Array = NDArray[np.float64]
@@ -45,19 +45,8 @@ BLOCKS = 4
 MOST = 5.0
 """Widths that no prediction is worth: such a block was lost, not missed."""
 
-FRICTION, GAIN = 0.13, 0.1
-"""Standard deviations, relative, of friction and gain from log to log: friction of two runs of one day differed by
-13 %, and two of the public rigs drift by 10 to 20 % between days.
-
-On a Furuta pendulum, two logs of which are fitted, they widen bands of free runs of two others by 4 to 15 times.
-Without them 68 % of the arm's samples and 69 % of the pendulum's lie inside in one of these, with them 99 % in both.
-"""
-
 CLOSE_TO_REST = 0.29
 """Root mean square of what friction at low speeds is larger by, relative: up to a half on logs of real rigs."""
-
-MANY = 3
-"""Logs from which on a fit has seen how much they differ."""
 
 LEAST = 1e-3
 """Share of how much a signal varies that nobody minds to be missed."""
@@ -95,10 +84,8 @@ def sensitivity(problem: Problem, index: int, x: Array) -> Sensitivity:
         ahead = np.full(len(error[0]), track.run.horizons[0])
         return Sensitivity(error=error[0] / weight, slope=slope[0] / weight, age=ahead)
     time: Array = track.dt * np.arange(samples, dtype=np.float64)
-    if not track.windowed:
-        return Sensitivity(error=error[:, 0], slope=slope[:, 0], age=time)
-    ends = (np.moveaxis(a[1:], 1, 0).reshape(-1, *a.shape[2:]) for a in (error, slope))
-    return Sensitivity(error=next(ends), slope=next(ends), age=np.tile(time[1:], track.restarts.size))
+    age = np.tile(time[1:], track.restarts.size) if track.windowed else time
+    return Sensitivity(error=track.flat(error), slope=track.flat(slope), age=age)
 
 
 def _as_assessed(track: Track, r: Array, J: Array) -> Sensitivity:
@@ -219,27 +206,6 @@ def _missed(problem: Problem, met: Sensitivity, block: _Block, covariance: Array
     return np.concatenate([np.abs(error[:, k]) / width[c] for k, c in _signals(track)])
 
 
-def log_name(run: Run) -> str:
-    """The log that a run is from, as its source names it; empty where nobody says."""
-    return run.source.partition(";")[0]
-
-
-def of_another_day(bands: Bands, rig: GreyBox, run: Run) -> Array:
-    """The covariance (names, names) with what friction and gain may differ by in a log of its own.
-
-    All friction together, and the drive's gain, by `FRICTION` and `GAIN` of themselves. Where the fitted runs are from
-    `MANY` logs or more these differed as well, and the covariance holds it already.
-    """
-    log = log_name(run)
-    if not log or not bands.logs or log in bands.logs or len(bands.logs) >= MANY:
-        return bands.covariance
-    value = {n: p.value for n, p in rig.parameters.items()}
-    rubs = friction_names(rig)
-    friction = np.array([FRICTION * value.get(n, 0.0) if n in rubs else 0.0 for n in bands.names])
-    gain = np.array([GAIN * value.get(n, 0.0) if n == "actuator.gain" else 0.0 for n in bands.names])
-    return bands.covariance + np.outer(friction, friction) + np.outer(gain, gain)
-
-
 def with_slow_friction(C: Array, names: Sequence[str], rig: GreyBox, slow: Sequence[SlowFriction]) -> Array:
     """The covariance (names + slow, names + slow) with friction at low speeds beside that at others."""
     follows = np.array([[float(n == each.coulomb) for n in names] for each in slow]).reshape(len(slow), len(names))
@@ -271,9 +237,9 @@ def _own(problem: Problem, index: int) -> NDArray[np.int64]:
 def adapted(problem: Problem, index: int, slope: Array, x: Array) -> tuple[Array, Array]:
     """Slopes (N, outputs, sought) of a run whose own numbers follow, by least squares, as they do when it is predicted.
 
-    Those of its own numbers become zero. Samples before `score_from` alone are followed where that is set. Beside them,
-    what an error of one sigma of each thing that is known of its own numbers beforehand does (N, outputs, priors): it
-    decides the more, the worse the run is explained.
+    Those of its own numbers become zero. What else moves the run may stand behind the numbers sought. Samples before
+    `score_from` alone are followed where that is set. Beside them, what an error of one sigma of each thing that is
+    known of its own numbers beforehand does (N, outputs, priors): it decides the more, the worse the run is explained.
     """
     track, own = problem.tracks[index], _own(problem, index)
     if not own.size:
@@ -381,16 +347,20 @@ def banded(
         met = sensitivity(problem, 0, x)
         age, variance = met.age, np.full(plain.y.shape, math.inf)
         if met.finite:
-            slope, start = adapted(problem, 0, met.slope, x)
+            daily = of_another_day(bands, run)
+            moves = daily_moves(problem, x, daily) if daily else met.slope[..., :0]
+            slope, start = adapted(problem, 0, np.concatenate([met.slope, moves], axis=-1), x)
+            slope, moves = np.split(slope, [met.slope.shape[-1]], axis=-1)
             uncertain_by = [*bands.names, *(stiction.name for _, stiction, _ in slow)]
-            C = with_slow_friction(of_another_day(bands, rig, run), bands.names, rig, [each for each, *_ in slow])
+            C = with_slow_friction(bands.covariance, bands.names, rig, [each for each, *_ in slow])
             places = [uncertain_by.index(problem.unknowns[i].name) if problem.unknowns[i].shared else -1
                       for i in problem.sought_in(0)]  # fmt: skip
             shared = np.flatnonzero(np.array(places) >= 0)
             rows = np.array(places)[shared]
             value = problem.value(x)
             natural = np.array([1 / value[i] if problem.unknowns[i].log else 1.0 for i in problem.sought_in(0)])
-            variance = _variance((slope * natural)[..., shared], C[np.ix_(rows, rows)]) + _squares(start)
+            variance = _variance((slope * natural)[..., shared], C[np.ix_(rows, rows)])
+            variance += _squares(moves) + _squares(start)
     width = _width(track, bands, age, np.nan_to_num(variance, nan=math.inf))
     return replace(
         plain, band={c: bands.quantile * w for c, w in width.items()}, beyond=beyond(rig, run, bands.reached)
