@@ -125,7 +125,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
         return JSONResponse(await asyncio.to_thread(listed, hub.station.folder, hub.station.rig.name))
 
     def readable(request: Request) -> bool:
-        """Whether the files of a rig are for whoever wants them: in a class its operator and the instructor have them."""
+        """Whether the files of a rig are for whoever wants them: of a class, for operator and instructor alone."""
         hub = hubs[request.path_params["name"]]
         return (
             room is None or bool(request.scope.get(INSTRUCTOR)) or hub.operated_by(request.query_params.get("me", ""))
