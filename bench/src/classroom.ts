@@ -10,7 +10,7 @@ export interface ClassFacts {
   unit: string;
 }
 
-const STATES = ["idle", "starting", "running", "stopped", "ended", "fell"] as const;
+const STATES = ["idle", "starting", "running", "stopped", "ended", "fell", "records"] as const;
 export type Seen = (typeof STATES)[number];
 
 export interface StudentState {
@@ -38,11 +38,12 @@ export function decodeClass(buffer: ArrayBuffer): { late: number; students: Stud
 export function told({ state, operated, seconds }: StudentState): string {
   if (state === "idle") return operated ? "idle" : "nobody yet";
   if (state === "starting") return "starting";
+  if (state === "records") return `recording for ${seconds} s`;
   return state === "running" ? `upright for ${seconds} s` : `${state} at ${seconds} s`;
 }
 
-const SHOWN: readonly Seen[] = ["running", "fell", "stopped", "idle"];
-const COUNTED: Partial<Record<Seen, string>> = { running: "upright", fell: "fell", stopped: "stopped", idle: "idle" };
+const SHOWN: readonly Seen[] = ["running", "records", "fell", "stopped", "idle"];
+const COUNTED: Partial<Record<Seen, string>> = { running: "upright", records: "recording", fell: "fell", stopped: "stopped", idle: "idle" };
 
 /** How many there are of each: "12 upright, 2 fell, 1 stopped, 45 idle". */
 export function summed(students: StudentState[]): string {
@@ -71,7 +72,7 @@ class Tile {
     say(this.text, told(seen));
     this.text.dataset["state"] = this.link.dataset["state"] = seen.state;
     const shift = Math.max(-12, Math.min(12, 200 * seen.away)), turn = seen.state === "fell" ? Math.sign(seen.away || 1) * 90 : seen.away * DEGREE;
-    const pose = seen.state === "idle" ? "rotate(180)" : this.turns ? `rotate(${-turn})` : `translate(${shift} 0)`;
+    const pose = seen.state === "idle" ? "rotate(180)" : seen.state === "records" && this.turns ? `rotate(${180 - turn})` : this.turns ? `rotate(${-turn})` : `translate(${shift} 0)`;
     this.svg.querySelector(".rod")!.setAttribute("transform", pose);
   }
 }

@@ -52,6 +52,7 @@ async function bench(): Promise<void> {
   const { rigs: all, class: ofClass } = await rigs(), known = all.find((rig) => rig.name === place()[0]);
   if (ofClass && !known) return classroom(all, ofClass);
   document.body.classList.toggle("in-class", ofClass !== undefined);
+  if (ofClass) for (const from of ["hanging", "motions"]) document.querySelector(`#from option[value=${from}]`)?.remove();
   document.body.classList.toggle("instructs", ofClass?.instructor === true);
   const name = (known ?? all[0])?.name;
   if (!name) return message("This bench has no rig; start it with a RIG.toml.");

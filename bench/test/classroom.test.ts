@@ -25,7 +25,7 @@ test("a frame that is cut, or tells of no state, is refused", () => {
 });
 
 test("everybody is counted once", () => {
-  const { students } = decodeClass(frame(0, [[2, 1, 0, 3], [5, 1, 0, 3], [0, 0, 0, 0], [1, 1, 0, 0], [4, 1, 0, 9], [3, 1, 0, 1]]));
-  expect(summed(students)).toBe("1 upright, 1 fell, 1 stopped, 3 idle");
-  expect(students.map(told)).toEqual(["upright for 3 s", "fell at 3 s", "nobody yet", "starting", "ended at 9 s", "stopped at 1 s"]);
+  const { students } = decodeClass(frame(0, [[2, 1, 0, 3], [5, 1, 0, 3], [0, 0, 0, 0], [1, 1, 0, 0], [4, 1, 0, 9], [3, 1, 0, 1], [6, 1, 0, 7]]));
+  expect(summed(students)).toBe("1 upright, 1 recording, 1 fell, 1 stopped, 3 idle");
+  expect(students.map(told)).toEqual(["upright for 3 s", "fell at 3 s", "nobody yet", "starting", "ended at 9 s", "stopped at 1 s", "recording for 7 s"]);
 });

@@ -12,7 +12,7 @@ import pytest
 from scipy.linalg import expm
 
 from upright.browser.classroom.lanes import Lanes
-from upright.browser.classroom.memory import BY_HAND, ENDED, HEAD, LEANT, ROWS, RUNNING, SharedLanes
+from upright.browser.classroom.memory import BY_HAND, ENDED, HEAD, LEANT, ROWS, RUNNING, TRAVELLED, SharedLanes
 from upright.browser.classroom.overview import STATES, frame
 from upright.browser.classroom.process import TICKS, Attendant, LanesOrder
 from upright.browser.classroom.room import LaneDesk
@@ -24,6 +24,7 @@ from upright.rig.makes import make_rig
 from upright.rigs import TwinPort
 from upright.rigs.law import RunningLaw
 from upright.rigs.protocol import Fault
+from upright.running.rig import excitation_law
 
 SEEDS = (1, 2, 17)
 AWAY = [0.0, 0.0, math.radians(3.0), 0.0]
@@ -41,6 +42,14 @@ def law(which=0):
         made.A, made.B, made.C, made.D, begin=made.begin, target=np.array([0.0, math.pi]), limit=MODEL.limit,
         command_resolution=MODEL.converter, references=np.zeros((1, 1)) if made.signal().shape[1] else None,
         period=made.period,
+    )  # fmt: skip
+
+
+def following():
+    """The same law with a reference beside its readings."""
+    return replace(
+        law(), D=np.array([[*law().D[0, :2], 5.0]]), B=np.pad(law().B[:, :2], ((0, 0), (0, 1))),
+        references=np.zeros((1, 1)),
     )  # fmt: skip
 
 
@@ -248,8 +257,7 @@ def test_refused_gains_change_nothing_and_are_answered_at_once(room):
 def test_a_wave_that_a_student_follows_is_the_waves_own_at_every_tick():
     """A quarter of a radian either side, 0.4 s long, from the slice on at which it is taken; the ring shows it."""
     shared = SharedLanes(1, 2)
-    tracking = replace(law(), D=np.array([[*law().D[0, :2], 5.0]]), B=np.pad(law().B[:, :2], ((0, 0), (0, 1))),
-                       references=np.zeros((1, 1)))  # fmt: skip
+    tracking = following()
     order = LanesOrder(
         rigs=[MODEL], at="inverted", zero="hanging", law=tracking, travel=(2.0, math.inf), lean=math.radians(30),
         fifo=False,
@@ -269,12 +277,83 @@ def test_a_wave_that_a_student_follows_is_the_waves_own_at_every_tick():
         assert row["applied"] == running.step([n / p for n, p in zip(row["counts"], PER, strict=False)], reference)
 
 
+def chirp(seconds):
+    """A signal that moves arm and pendulum, and is no whole number of steps of the converter."""
+    t = MODEL.period * np.arange(round(seconds / MODEL.period))
+    return 1.3 * np.sin(math.tau * (1.0 + 3.0 * t) * t)
+
+
+def signalled(rig, samples):
+    """The board of `upright bench`'s twin at rest, moved by a signal as `upright run --excite` moves it."""
+    port = TwinPort(rig)
+    port.enable(True)
+    blind = replace(
+        excitation_law(samples, 2, MODEL.period), limit=MODEL.limit, command_resolution=MODEL.converter,
+        target=np.zeros(2), references=np.zeros((1, 1)),
+    )  # fmt: skip
+    running, counts, commands = RunningLaw(blind, MODEL.period), [], []
+    for sample in samples:
+        counts.append(port.read())
+        commands.append(running.step([n / per for n, per in zip(counts[-1], PER, strict=True)], sample))
+        port.write(commands[-1])
+        port.advance()
+    return np.array(counts), np.array(commands)
+
+
+def test_a_signal_moves_a_lane_at_rest_as_its_twin_by_itself_to_the_last_bit_and_leaves_nothing_behind():
+    """It hangs, which is no fall; the run lasts as long as the signal; the next one is as if none had been before."""
+    samples = chirp(0.3)
+
+    def attended():
+        shared = SharedLanes(2, 2)
+        order = LanesOrder(
+            rigs=[make_rig("furuta", seed) for seed in (2, 17)], at="inverted", zero="hanging", law=following(),
+            travel=(2.0, math.inf), lean=math.radians(30), fifo=False, signals=[chirp(0.1), samples],
+        )  # fmt: skip
+        return shared, Attendant(order, shared)
+
+    shared, attendant = attended()
+    desk = LaneDesk(shared, 1, 0.0, (0.0, 0.0), lambda asked: ("", asked), 2)
+    desk.begin(len(samples))
+    for _ in range(len(samples) // TICKS + 2):
+        attendant.slice()
+    assert shared.answers()["why"][1] == ENDED
+    _, rows = desk.since(0)
+    counts, commands = signalled(make_rig("furuta", 17), samples)
+    assert np.ptp(counts, axis=0).min() > 50
+    assert np.array_equal(rows["counts"][:, :2], counts)
+    assert np.array_equal(rows["applied"].view(np.int64), commands.view(np.int64))
+    again, (fresh, other) = begun(shared, 1), attended()
+    first = begun(fresh, 1)
+    for _ in range(12):
+        attendant.slice()
+        other.slice()
+    mine, plain = (each.since(0)[1][["counts", "applied"]] for each in (again, first))
+    assert mine.tobytes() == plain.tobytes()
+
+
+def test_a_signal_ends_where_the_travel_does():
+    shared = SharedLanes(1, 2)
+    order = LanesOrder(
+        rigs=[MODEL], at="inverted", zero="hanging", law=following(), travel=(0.05, math.inf), lean=math.radians(30),
+        fifo=False, signals=[np.full(2000, 3.0)],
+    )  # fmt: skip
+    attendant, desk = Attendant(order, shared), LaneDesk(shared, 0, 0.0, (0.0, 0.0), lambda asked: ("", asked), 1)
+    desk.begin(2000)
+    for _ in range(2000 // TICKS):
+        attendant.slice()
+    first, end = desk.span
+    assert shared.answers()["why"][0] == TRAVELLED
+    assert abs(shared.counts()[end % ROWS, 0, 0] / PER[0]) > 0.05
+    assert np.abs(shared.counts()[first:end, 0, 0] / PER[0]).max() <= 0.05
+
+
 def test_a_frame_of_the_class_has_six_bytes_for_each_student():
     """Read by its description: 60 students at 5 a second cost 1.8 kB/s, less than a tenth of one rig's samples."""
     states = ["idle", "running", "stopped", "stopped"]
     faults = [Fault(0), Fault(0), Fault.STOP, Fault.OVERTRAVEL]
     stations = [
-        SimpleNamespace(state=s, lease=SimpleNamespace(holder="x" * (s != "idle")),
+        SimpleNamespace(state=s, origin="held", lease=SimpleNamespace(holder="x" * (s != "idle")),
                         last=SimpleNamespace(faults=f, time=12.7))
         for s, f in zip(states, faults, strict=True)
     ]  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.browser.runs import SOON, hardware, twin
-from upright.browser.identify.recording import Recording
+from upright.browser.identify.recording import Recording, recording_plan
 from upright.browser.messages import ONE_STEP, SWEEP
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.one_by_one import stepped_sines
@@ -50,7 +50,7 @@ def rig(tmp_path_factory):
 
 def played(rig, kind, folder, monkeypatch, lost=()):
     monkeypatch.setattr("upright.browser.identify.recording.OFTEN", 1e-4)
-    recording = Recording(rig, kind)
+    recording = Recording(recording_plan(rig, kind))
     model, samples = make_rig("furuta", 3), recording.request.samples
     record = TwinStand(rig=model).run(list(samples), folder, "played")
     y, u = np.column_stack([record["psi"], record["theta"]]), record["u_applied"]
@@ -98,7 +98,7 @@ def test_a_coordinate_that_does_not_move_has_no_gain_and_a_file_that_cannot_be_s
     rig, tmp_path, monkeypatch
 ):
     monkeypatch.setattr("upright.browser.identify.recording.OFTEN", 1e-4)
-    recording = Recording(rig, SWEEP)
+    recording = Recording(recording_plan(rig, SWEEP))
     u = np.array(recording.request.samples)
     desk = Played(np.column_stack([u, np.zeros(u.size)]), u, rig.model.per_unit)
     recording.begin(desk)
@@ -114,7 +114,7 @@ def test_a_coordinate_that_does_not_move_has_no_gain_and_a_file_that_cannot_be_s
 
 
 def test_a_run_shows_each_command_with_the_readings_after_it_and_its_log_with_those_before(rig, tmp_path):
-    request = Recording(rig, ONE_STEP).request
+    request = recording_plan(rig, ONE_STEP).request
     run, desk = prepared(replace(request, seconds=1.2), tmp_path), Desk()
     run_in_process(run.order, paced=False, desk=desk)
     _, rows = desk.since(0)
@@ -143,4 +143,4 @@ def test_of_a_step_everything_is_drawn_beside_what_the_model_would_show_and_its_
 def test_a_rig_that_can_really_move_is_recorded_by_somebody_beside_it(rig):
     for kind in (SWEEP, ONE_STEP):
         with pytest.raises(BadInput, match="upright lab"):
-            Recording(hardware(rig), kind)
+            recording_plan(hardware(rig), kind)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from upright.basis import NOT_TRUSTED
 from upright.browser.hanging import first_motions, swing_up_apart
 from upright.browser.identify.last_use import LastUse
-from upright.browser.identify.recording import Recording
+from upright.browser.identify.recording import Recording, RecordingPlan, recording_plan
 from upright.browser.lease import Lease
 from upright.browser.messages import HANGING, HELD, MOTIONS, ONE_STEP, SWEEP, ClientRequest
 from upright.browser.rig import HARDWARE, TWIN, BenchRig
@@ -79,6 +79,8 @@ class Station:
         Time that never goes back [s].
     desk : callable
         Gives the desk of a run that is requested.
+    plan : callable
+        Gives the plan of a sweep or a step.
 
     Attributes
     ----------
@@ -116,6 +118,7 @@ class Station:
         report: Callable[[PreparedRun, RunEnd, float], str] = report_apart,
         swing_up: Callable[[BenchRig, Path], str] = swing_up_apart, clock: Callable[[], float] = time.monotonic,
         desk: Callable[[RunRequest], RunDesk] = lambda _: Desk(),
+        plan: Callable[[BenchRig, str], RecordingPlan] = recording_plan,
     ) -> None:  # fmt: skip
         self.rig, self.folder, self.lease = rig, folder, Lease(clock)
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
@@ -127,7 +130,7 @@ class Station:
         self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
-        self._new_desk, self.writing = desk, 0
+        self._new_desk, self._plan, self.writing = desk, plan, 0
         self.recording: Recording | None = None
         self.last_use: LastUse | None = None
 
@@ -197,7 +200,7 @@ class Station:
         if origin == HANGING and (why := self.hanging):
             self.prepare()
             raise BadInput(why)
-        recording = Recording(rig, origin) if origin in (SWEEP, ONE_STEP) else None
+        recording = Recording(self._plan(rig, origin)) if origin in (SWEEP, ONE_STEP) else None
         if recording is not None or origin == MOTIONS:
             request = first_motions(rig) if recording is None else recording.request
             seconds = request.seconds

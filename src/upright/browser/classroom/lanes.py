@@ -60,6 +60,8 @@ class Lanes:
         Which of them have begun.
     followed : array, shape (rigs, ticks)
         Reference of each at each tick of the next call.
+    plays : bool
+        Whether its law has a reference, through which a signal can be put out.
 
     Raises
     ------
@@ -96,7 +98,7 @@ class Lanes:
         self._work = [aligned(self._call.room) for _ in range(self._call.blocks)]
         self._spare = aligned(self._call.room)
         self._rows, self._behind = self._stepper.rows, len(self._stepper.rows) * WIDTH
-        self.followed = np.zeros((len(rigs), ticks))
+        self.followed, self.plays = np.zeros((len(rigs), ticks)), self._references > 0
         self.busy = np.zeros(len(rigs), dtype=np.bool_)
         for lane in range(len(rigs)):
             self.rest(lane)
@@ -104,6 +106,13 @@ class Lanes:
     def begin(self, lane: int, away: Sequence[float]) -> None:
         """Let go of a rig away from what is held, under the law as it was given."""
         self._put(lane, np.asarray(self._plant.state(self.at)) + np.asarray(away))
+        self.followed[lane] = 0.0
+        self.busy[lane] = True
+
+    def play(self, lane: int) -> None:
+        """Put out from rest what the rig is given to follow, looking at nothing."""
+        self.rest(lane)
+        self._write(lane, f"lD0_{len(self._per)}", 1.0)
         self.followed[lane] = 0.0
         self.busy[lane] = True
 

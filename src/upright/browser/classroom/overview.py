@@ -13,6 +13,7 @@ import time
 import numpy as np
 
 from upright.browser.classroom.room import Classroom
+from upright.browser.messages import HELD
 from upright.browser.outbox import Outbox
 from upright.browser.station import ENDED, IDLE, RUNNING, STARTING, STOPPED
 from upright.errors import BadInput
@@ -20,7 +21,7 @@ from upright.rigs.protocol import Fault
 
 RATE = 5.0
 """Frames a second."""
-STATES = (IDLE, STARTING, RUNNING, STOPPED, ENDED, "fell")
+STATES = (IDLE, STARTING, RUNNING, STOPPED, ENDED, "fell", "records")
 MOST = 16
 """Who looks on at most."""
 _STUDENT = np.dtype([("state", "u1"), ("operated", "u1"), ("away", "<i2"), ("seconds", "<u2")])
@@ -32,7 +33,8 @@ def frame(room: Classroom) -> bytes:
     students["away"] = np.clip(np.rint(1e3 * room.away), -32767, 32767)
     for student, station in zip(students, room.stations, strict=True):
         fell = station.state == STOPPED and Fault.OVERTRAVEL in station.last.faults
-        student["state"] = STATES.index("fell" if fell else station.state)
+        records = station.state == RUNNING and station.origin != HELD
+        student["state"] = STATES.index("fell" if fell else "records" if records else station.state)
         student["operated"] = bool(station.lease.holder)
         student["seconds"] = min(65535, int(station.last.time))
     head = len(students).to_bytes(2, "little") + min(room.late, 2**32 - 1).to_bytes(4, "little")

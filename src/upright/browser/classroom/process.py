@@ -60,6 +60,8 @@ class LanesOrder:
         How far the last one may be from the law's target.
     fifo : bool
         Whether to ask for FIFO priority.
+    signals : sequence of array
+        What a rig can be ordered to put out from rest, by a number from 1 on.
     """
 
     rigs: Sequence[Rig]
@@ -69,6 +71,7 @@ class LanesOrder:
     travel: tuple[float, ...]
     lean: float
     fifo: bool
+    signals: Sequence[Array] = ()
 
 
 class Attendant:
@@ -84,6 +87,7 @@ class Attendant:
         self._command, self._reference = shared.numbers("command"), shared.numbers("reference")
         self._period = order.rigs[0].period
         self._following: dict[int, Reference] = {}
+        self._signals, self._playing = order.signals, dict[int, Array]()
         self._given = np.zeros(shared.lanes, dtype=np.int64)
         self._felt = self._orders["taps"].copy()
         self._due = np.zeros(shared.lanes, dtype=np.int64)
@@ -113,11 +117,16 @@ class Attendant:
             run = orders["run"][lane]
             self._felt[lane], self._given[lane] = orders["taps"][lane], orders["given"][lane]
             self._following.pop(lane, None)
+            self._playing.pop(lane, None)
             answers["followed"][lane] = 0
             self._due[lane] = head + orders["ticks"][lane]
             answers["first"][lane], answers["last"][lane], answers["why"][lane] = head, head, RUNNING
             answers["late"][lane], answers["changed"][lane] = late, orders["change"][lane]
             answers["run"][lane] = run
+            if signal := int(orders["signal"][lane]):
+                self._playing[lane] = self._signals[signal - 1]
+                self.lanes.play(lane)
+                continue
             away = np.zeros(2 * len(self._per))
             away[-2] = orders["away"][lane]
             self.lanes.begin(lane, away.tolist())
@@ -132,6 +141,11 @@ class Attendant:
         if (taps != self._felt[lane]).any():
             self.lanes.tap(lane, (taps - self._felt[lane]).tolist())
             self._felt[lane], answer["taken"] = taps, time.monotonic_ns()
+        if lane in self._playing:
+            first = int(head - answer["first"])
+            played = self._playing[lane][first : first + TICKS]
+            self.lanes.follow(lane, np.pad(played, (0, TICKS - len(played))))
+            return
         wanted = order.copy()
         if wanted["given"] not in (0, self._given[lane]) and order["given"] == wanted["given"]:  # 0 while it is written
             self._following[lane] = Reference(
@@ -145,7 +159,9 @@ class Attendant:
 
     def _judge(self, stretch: LaneTicks, head: int) -> None:
         readings: Array = stretch.counts / self._per
-        leant = ~(np.abs(readings[..., -1] - self._target) <= self._lean) | ~np.isfinite(stretch.command)
+        leant = ~(np.abs(readings[..., -1] - self._target) <= self._lean)
+        leant[:, list(self._playing)] = False  # they hang, or stand by themselves
+        leant |= ~np.isfinite(stretch.command)
         beyond = ~(np.abs(readings) <= self._travel)
         over = leant | beyond.any(axis=2)
         for lane in np.flatnonzero(self.lanes.busy).tolist():

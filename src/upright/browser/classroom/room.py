@@ -36,6 +36,8 @@ from upright.browser.classroom.memory import (
 )
 from upright.browser.classroom.process import LanesOrder, run_lanes
 from upright.browser.classroom.roster import Student
+from upright.browser.identify.recording import RecordingPlan, recording_plan
+from upright.browser.messages import ONE_STEP, SWEEP
 from upright.browser.rig import HARDWARE, NO_LAW, BenchRig
 from upright.browser.runs import in_own_process, write_report
 from upright.browser.station import Station
@@ -48,6 +50,7 @@ from upright.realtime.process import BY_HAND as STOPPED_BY_HAND
 from upright.realtime.process import DEAF
 from upright.realtime.reference import SHAPES, Reference
 from upright.realtime.session import RunEnd, RunOrder, RunState
+from upright.rigs.law import for_rig
 from upright.rigs.protocol import NO_FAULT, Fault, Mode
 from upright.running.rig import about_what_is_held, model_and_truth, stage_of
 from upright.running.run import PreparedRun, RunRequest
@@ -55,7 +58,7 @@ from upright.running.run import PreparedRun, RunRequest
 POLL = 0.05
 """Between two looks at the lanes [s]."""
 GONE = "The process of the class has ended; start the bench again. The log holds what came before."
-UPRIGHT_ONLY = "In a class every run begins upright; a twin of upright bench by itself can begin hanging."
+NOT_HERE = "A class has no swing-up and no first motions; a twin of upright bench by itself has both."
 
 
 class LaneDesk:
@@ -63,12 +66,12 @@ class LaneDesk:
 
     def __init__(
         self, shared: SharedLanes, lane: int, tilt: float, target: tuple[float, ...],
-        judge: Callable[[Law], tuple[str, Law]],
+        judge: Callable[[Law], tuple[str, Law]], signal: int = 0,
     ) -> None:  # fmt: skip
         self._orders, self._answers, self._marks = shared.orders(), shared.answers(), shared.marks()
         self._ring, self._late, self._applied = shared.counts(), shared.late(), shared.numbers("command")
         self.lane, self.run, self.tilt = lane, int(self._orders["run"][lane]) + 1, tilt
-        self._judge, self._refused, self._changes, self._target = judge, "", 0, target
+        self._judge, self._refused, self._changes, self.target, self._signal = judge, "", 0, target, signal
         self._first, self._requested = int(self._orders["given"][lane]) + 1, dict[int, Reference]()
         self.stopping, self._begun = False, False
         self.events: list[tuple[int, Law]] = []
@@ -81,7 +84,7 @@ class LaneDesk:
     def begin(self, ticks: int) -> None:
         """Ask for the run."""
         order = self._orders[self.lane]
-        order["away"], order["ticks"] = self.tilt, ticks
+        order["away"], order["ticks"], order["signal"] = self.tilt, ticks, self._signal
         order["run"] = self.run
 
     def stop(self) -> None:
@@ -109,7 +112,7 @@ class LaneDesk:
         answer = self._answers[self.lane]
         number = int(answer["followed"]) if answer["run"] == self.run else 0
         return (
-            (number, self._requested[number], int(answer["since"]), self._target) if number in self._requested else None
+            (number, self._requested[number], int(answer["since"]), self.target) if number in self._requested else None
         )
 
     def change(self, law: Law) -> bool:
@@ -216,10 +219,13 @@ class Classroom:
         assert isinstance(law, Law)  # as the one it was made of
         self.law, self._units = law, stage.units
         self._beside.start()
+        self._plans = _plans(rig) if law.signal().shape[1] else {}  # a signal goes the way of a reference
+        self._held_at = np.full(len(students), self._beside.target[-1])
         self._shared = SharedLanes(len(students), len(stage.units))
         self._order = LanesOrder(
             rigs=[model_and_truth(replace(rig.file, seed=student.seed))[1] for student in students], at=rig.at,
             zero=rig.zero, law=law, travel=self._beside.held.travel, lean=self._beside.duty.lean, fifo=fifo,
+            signals=[plan.signal.samples for plan in self._plans.values()],
         )  # fmt: skip
         self._runs: dict[int, _LaneRun] = {}
         self.pid = 0
@@ -253,7 +259,7 @@ class Classroom:
         ends = np.where(answers["why"] == RUNNING, head, answers["last"])
         there = (answers["run"] > 0) & (ends > answers["first"]) & (ends > head - ROWS // 2)
         counts = self._shared.counts()[(ends - 1) % ROWS, np.arange(len(ends)), -1]
-        away = counts / self._about.counts[-1] - self._beside.target[-1]
+        away = counts / self._about.counts[-1] - self._held_at
         return np.where(there, away, 0.0)
 
     def stop_all(self, why: str) -> None:
@@ -272,12 +278,23 @@ class Classroom:
         known = replace(self.rig, name=student.address, model=model, file=file)
         return Station(
             known, folder / student.address, carry=self._carry, report=self._write, swing_up=_no_swing_up,
-            desk=partial(self._desk, lane),
+            desk=partial(self._desk, lane), plan=self._plan,
         )  # fmt: skip
 
+    def _plan(self, rig: BenchRig, kind: str) -> RecordingPlan:
+        """One for all, by the rig that all know."""
+        return self._plans[kind] if kind in self._plans else recording_plan(rig, kind)
+
     def _desk(self, lane: int, request: RunRequest) -> LaneDesk:
+        plans = [plan.request for plan in self._plans.values()]
+        self._held_at[lane] = 0.0 if request in plans else self._beside.target[-1]
+        if request in plans:
+            hanging = (0.0,) * len(self._units)
+            return LaneDesk(self._shared, lane, 0.0, hanging, self._judged, 1 + plans.index(request))
+        if request.samples is not None:
+            raise BadInput("the law of this class has no reference, through which its twins put a signal out.")
         if request.law is None or request.from_rest:
-            raise BadInput(UPRIGHT_ONLY)
+            raise BadInput(NOT_HERE)
         return LaneDesk(self._shared, lane, request.tilt, self._beside.target, self._judged)
 
     def _judged(self, law: Law) -> tuple[str, Law]:
@@ -293,7 +310,7 @@ class Classroom:
         if self._gone.is_set():
             raise BadInput(GONE)
         if desk.stopping:
-            return RunEnd(stopped=STOPPED_BY_HAND)
+            return RunEnd(stopped=STOPPED_BY_HAND, held=self._beside.held, target=desk.target)
         order.log.touch()  # the next run is called otherwise, also while this one's log is not written
         with open(rows_of(order.log), "wb") as rows:
             run = _LaneRun(desk=desk, watch=watch, rows=rows)
@@ -309,7 +326,7 @@ class Classroom:
         late = int(self._shared.late()[(end - 1) % ROWS] - answer["late"]) if end > first else 0
         return RunEnd(
             ticks=end - first, late=late, passed=min(late, int(self._shared.marks()[PASSED])), stopped=stopped,
-            faults=faults, about=self._about, held=self._beside.held, target=self._beside.target, rows=run.written,
+            faults=faults, about=self._about, held=self._beside.held, target=desk.target, rows=run.written,
             dropped=run.dropped, events=tuple(run.changes), warning="" if self.priority == "FIFO" else "No FIFO.",
             seconds=(end - first) * self._about.period,
         )  # fmt: skip
@@ -339,9 +356,11 @@ class Classroom:
 
     def _report(self, run: PreparedRun, end: RunEnd, started: float) -> str:
         """One after the other: processors are few, and whoever moves comes first; logs wait for no report."""
-        order = replace(run.order, law=as_values(self.law))
-        kept = replace(run, law=NO_LAW, order=order)
-        of_log = (kept, end, started, self._units, self.law)
+        assert end.held is not None  # every run of a lane has its limits
+        law = for_rig(run.law, self._about, end.held, end.target)
+        assert isinstance(law, Law)  # as every desk has seen to
+        kept = replace(run, law=NO_LAW, order=replace(run.order, law=as_values(law)))
+        of_log = (kept, end, started, self._units, law)
         with self._logging:
             if self._closing.is_set():  # no process is begun any more
                 write_lane_log(*of_log)
@@ -404,7 +423,7 @@ class Classroom:
                     late=int(rows["late"][-1]), mode=Mode.HOST, command=float(rows["command"][-1]),
                     applied=float(rows["applied"][-1]), counts=tuple(counts),
                     readings=tuple(n / per - t for n, per, t in
-                                   zip(counts, self._about.counts, self._beside.target, strict=True)),
+                                   zip(counts, self._about.counts, desk.target, strict=True)),
                 )
             ):  # fmt: skip
                 desk.stop()
@@ -428,5 +447,14 @@ class Classroom:
             run.changes.append(((int(answer["at"]) - 1) * self._about.period, *other_gains(law)))
 
 
+def _plans(rig: BenchRig) -> dict[str, RecordingPlan]:
+    """Sweep and step, where the rig has one."""
+    plans = dict[str, RecordingPlan]()
+    for kind in (SWEEP, ONE_STEP):
+        with suppress(BadInput):
+            plans[kind] = recording_plan(rig, kind)
+    return plans
+
+
 def _no_swing_up(_rig: BenchRig, _path: Path) -> str:
-    raise BadInput(UPRIGHT_ONLY)
+    raise BadInput(NOT_HERE)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -28,6 +29,7 @@ from upright.experiments.frequency_1b.one_by_one import (
 )
 from upright.experiments.stand.live import live_stand
 from upright.experiments.stand.step import StepSignal, modes, predicted_step, reading, step_signal
+from upright.rig import Rig
 from upright.running.run import RunRequest
 from upright.signals.free_swing import Decay
 
@@ -45,35 +47,67 @@ class Samples(Protocol):
     def since(self, number: int) -> tuple[int, NDArray[np.void]]: ...  # noqa: D102
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordingPlan:
+    """What is put out to record a sweep or a step.
+
+    Attributes
+    ----------
+    kind : str
+        `SWEEP` or `ONE_STEP`.
+    rig : Rig
+        As it is known.
+    at : str
+        Equilibrium at which it rests.
+    request : RunRequest
+        The run that it is.
+    """
+
+    kind: str
+    rig: Rig
+    at: str
+    signal: SteppedSines | StepSignal
+    request: RunRequest
+
+
+def recording_plan(rig: BenchRig, kind: str) -> RecordingPlan:
+    """What a rig is to put out.
+
+    Raises
+    ------
+    BadInput
+        When it can really move, or has no such response.
+    """
+    if rig.kind == HARDWARE:
+        raise BadInput(
+            "a rig that can really move is moved by somebody who stands beside it: upright lab --rig RIG.toml "
+            "--experiment 1b, or upright run RIG.toml --excite."
+        )
+    stand = live_stand(rig.rig_path)
+    signal = stepped_sines(stand) if kind == SWEEP else step_signal(stand)
+    request = RunRequest(
+        rig=rig.rig_path, samples=tuple(signal.samples.tolist()), seconds=signal.seconds, check=False, watch=False,
+        what=kind,
+    )  # fmt: skip
+    return RecordingPlan(kind=kind, rig=stand.rig, at=stand.resting, signal=signal, request=request)
+
+
 class Recording:
     """A sweep or a step of a twin.
 
     Attributes
     ----------
+    kind : str
+        `SWEEP` or `ONE_STEP`.
     request : RunRequest
         The run that it is.
-
-    Raises
-    ------
-    BadInput
-        When the rig can really move, or has no such response.
     """
 
-    def __init__(self, rig: BenchRig, kind: str) -> None:
-        if rig.kind == HARDWARE:
-            raise BadInput(
-                "a rig that can really move is moved by somebody who stands beside it: upright lab --rig RIG.toml "
-                "--experiment 1b, or upright run RIG.toml --excite."
-            )
-        stand = live_stand(rig.rig_path)
-        self.kind, self._rig, self._at = kind, stand.rig, stand.resting
-        self._plan: SteppedSines | StepSignal = stepped_sines(stand) if kind == SWEEP else step_signal(stand)
+    def __init__(self, plan: RecordingPlan) -> None:
+        self.kind, self._rig, self._at, self._plan = plan.kind, plan.rig, plan.at, plan.signal
+        self.request = plan.request
         size = self._plan.samples.size
-        self.request = RunRequest(
-            rig=rig.rig_path, samples=tuple(self._plan.samples.tolist()), seconds=self._plan.seconds, check=False,
-            watch=False, what=kind,
-        )  # fmt: skip
-        self._y, self._u = np.full((size, len(stand.names)), np.nan), np.full(size, np.nan)
+        self._y, self._u = np.full((size, len(plan.rig.per_unit)), np.nan), np.full(size, np.nan)
         self._line: Facts = {}
         self._next, self._came, self._tried, self._lost, self._why = 0, 0, 0, 0, ""
         self._sines: list[Sine] = []
@@ -93,6 +127,8 @@ class Recording:
             self._thread.join()
         with self._lock:
             self._run = "" if log is None else log.stem
+            if self.kind == SWEEP:  # its sines are read; of a class sixty would be kept
+                self._y, self._u = self._y[:0], self._u[:0]
             if log is not None and self._sines:
                 try:  # the run has to end, whatever becomes of the file
                     response_of_sines(self._sines, self._rig).to_csv(log.with_suffix(".frequency.csv"))
