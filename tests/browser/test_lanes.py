@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import replace
 from functools import cache
@@ -15,7 +16,7 @@ from upright.browser.classroom.lanes import Lanes
 from upright.browser.classroom.memory import BY_HAND, ENDED, HEAD, LEANT, ROWS, RUNNING, TRAVELLED, SharedLanes
 from upright.browser.classroom.overview import STATES, frame
 from upright.browser.classroom.process import TICKS, Attendant, LanesOrder
-from upright.browser.classroom.room import LaneDesk
+from upright.browser.classroom.room import LaneDesk, LaneRun
 from upright.gains import feedback, filtered, place
 from upright.gains.requests import read_poles
 from upright.paper.reproduce import TABLE_1
@@ -233,6 +234,25 @@ def test_a_ring_that_was_not_read_in_time_gives_what_it_still_has(room):
     number, rows = desk.since(0)
     assert number == shared.marks()[HEAD] == ROWS + 3 * TICKS
     assert rows["number"].tolist() == list(range(number - ROWS // 2, number))
+
+
+def test_every_row_of_a_run_is_kept_once_although_the_lanes_move_on_while_it_is_read(room, monkeypatch):
+    _, attendant = room
+    desk = begun(room[0], 0)
+    attendant.slice()
+    still = LaneDesk.span
+
+    def moving(this):
+        attendant.slice()
+        return still.fget(this)
+
+    run, kept = LaneRun(desk=desk, watch=lambda _: "", rows=io.BytesIO()), []
+    monkeypatch.setattr(LaneDesk, "span", property(moving))
+    for _ in range(5):
+        ticks, rows = run.take()
+        kept += rows["number"].tolist()
+        assert (run.written, run.dropped) == (ticks, 0)
+    assert kept == list(range(ticks))
 
 
 def test_a_server_that_does_not_look_any_more_ends_every_run(room):

@@ -164,7 +164,7 @@ class LaneDesk:
 
 
 @dataclass(eq=False)
-class _LaneRun:
+class LaneRun:
     """A run that goes on: who watches it, and where its rows go until there is a log."""
 
     desk: LaneDesk
@@ -174,6 +174,13 @@ class _LaneRun:
     written: int = 0
     dropped: int = 0
     changes: list[tuple[float, str, str]] = field(default_factory=list[tuple[float, str, str]])
+
+    def take(self) -> tuple[int, NDArray[np.void]]:
+        """How many ticks there have been, and the rows that are new; the lanes move on meanwhile."""
+        ticks, rows = self.desk.since(self.written + self.dropped)
+        self.written += len(rows)
+        self.dropped = ticks - self.written
+        return ticks, rows
 
 
 class Classroom:
@@ -227,7 +234,7 @@ class Classroom:
             zero=rig.zero, law=law, travel=self._beside.held.travel, lean=self._beside.duty.lean, fifo=fifo,
             signals=[plan.signal.samples for plan in self._plans.values()],
         )  # fmt: skip
-        self._runs: dict[int, _LaneRun] = {}
+        self._runs: dict[int, LaneRun] = {}
         self.pid = 0
         self._logging, self._writing = threading.Lock(), threading.Lock()
         self._closing, self._gone = threading.Event(), threading.Event()
@@ -313,13 +320,13 @@ class Classroom:
             return RunEnd(stopped=STOPPED_BY_HAND, held=self._beside.held, target=desk.target)
         order.log.touch()  # the next run is called otherwise, also while this one's log is not written
         with open(rows_of(order.log), "wb") as rows:
-            run = _LaneRun(desk=desk, watch=watch, rows=rows)
+            run = LaneRun(desk=desk, watch=watch, rows=rows)
             self._runs[desk.lane] = run
             desk.begin(max(1, math.ceil(order.seconds / self._about.period - 1e-9)))
             run.over.wait()
         return self._end(run)
 
-    def _end(self, run: _LaneRun) -> RunEnd:
+    def _end(self, run: LaneRun) -> RunEnd:
         desk, answer = run.desk, self._shared.answers()[run.desk.lane]
         first, end = desk.span
         stopped, faults = self._why(answer) if desk.begun and answer["why"] != RUNNING else (GONE, Fault.WATCHDOG)
@@ -401,7 +408,7 @@ class Classroom:
             self._runs.pop(lane, None)
             run.over.set()
 
-    def _look(self, lane: int, run: _LaneRun) -> None:
+    def _look(self, lane: int, run: LaneRun) -> None:
         """Keep the rows that are new, and show the newest to whoever watches."""
         desk = run.desk
         if not desk.begun:
@@ -409,17 +416,15 @@ class Classroom:
                 desk.stop()
             return
         over = bool(self._shared.answers()["why"][lane] != RUNNING)  # before the rows, which are all there then
-        first, end = desk.span
-        _, rows = desk.since(run.written + run.dropped)
-        run.dropped += end - first - run.written - run.dropped - len(rows)
-        run.written += len(rows)
+        first, _ = desk.span
+        ticks, rows = run.take()
         self._keep_rows(run, rows, first)
         self._note_changes(run)
         if len(rows):
             counts = rows["counts"][-1][: len(self._units)].tolist()
             if run.watch(
                 RunState(
-                    phase="running", time=(end - first) * self._about.period, tick=end - first,
+                    phase="running", time=ticks * self._about.period, tick=ticks,
                     late=int(rows["late"][-1]), mode=Mode.HOST, command=float(rows["command"][-1]),
                     applied=float(rows["applied"][-1]), counts=tuple(counts),
                     readings=tuple(n / per - t for n, per, t in
@@ -431,7 +436,7 @@ class Classroom:
             self._runs.pop(lane, None)
             run.over.set()
 
-    def _keep_rows(self, run: _LaneRun, rows: NDArray[np.void], first: int) -> None:
+    def _keep_rows(self, run: LaneRun, rows: NDArray[np.void], first: int) -> None:
         n = len(self._units)
         kept = np.zeros(len(rows), dtype=row_of(n))
         kept["tick"], kept["counts"], kept["command"] = rows["number"], rows["counts"][:, :n], rows["command"]
@@ -439,7 +444,7 @@ class Classroom:
         with suppress(OSError):  # a full disk ends no run; its log is found to be short
             run.rows.write(kept.tobytes())
 
-    def _note_changes(self, run: _LaneRun) -> None:
+    def _note_changes(self, run: LaneRun) -> None:
         """Gains that have begun to act, as an event just before the first tick with them."""
         answer = self._shared.answers()[run.desk.lane]
         while run.desk.events and answer["changed"] >= run.desk.events[0][0]:
