@@ -10,7 +10,7 @@ authors advise. The scripts are in `benchmarks/peers`.
 - **SINDy and NARX**, as written here, take one angle and no command.
 - **Seconds** are CPU seconds, compilers included, so that other work on the machine does not count as much.
 
-Who is ahead of upright stands above each table. Why is not explained.
+Who is ahead of upright stands above each table, and what that comes of below it.
 
 Extra `peers`: `pip install '.[peers]'`. opty also needs IPOPT, whose Python interface (cyipopt) is built from source:
 `apt install coinor-libipopt-dev liblapack-dev libblas-dev pkg-config gcc`, then `pip install cyipopt opty`. A tool that
@@ -28,15 +28,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
-from itertools import product
+from itertools import product, takewhile
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
+from typing import TypeVar
 
 import numpy as np
 
 from benchmarks.measure import Line, page, shares
 
+T = TypeVar("T")
 TWINS, FEW = 20, 8
 """Twins of each kind, and for a peer that takes half a minute for one."""
 TIE = 0.2
@@ -47,9 +49,12 @@ APART = {
     "qube": "A balanced QUBE-Servo, predicted ahead: fit percent",
     "carts": "Two carts on springs, every run held out in turn: fit percent",
 }
-"""Sections whose tasks have modules of their own; `python -m benchmarks.peers NAME` runs one."""
+"""Sections whose tasks have modules of their own."""
+SECTIONS = {"tails": HELD_OUT, **APART}
+"""Sections that `python -m benchmarks.peers NAME` renews."""
 TRUTHS = ("with a right model", "with Stribeck friction that nobody models")
 INTERVALS = "Intervals of 95 % on Furuta twins {}"
+VERSIONS = "Versions: "
 PREDICTED = ("held out", *APART)
 """Questions whose lines are fit percents of what nobody saw."""
 POOR = 0.3
@@ -110,14 +115,9 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     if data := os.environ.get("UPRIGHT_REAL_DATA"):
         tasks = [tail(study, Path(data)) for study in (TAILS[-1:] if quick else TAILS)]
         shaken = [] if quick else [driven(Path(data))]
-        body += [
-            "",
-            f"## {HELD_OUT}",
-            "",
-            *_tails(grey + black, tasks + shaken, lines, progress),
-        ]
+        body += ["", f"## {HELD_OUT}", "", *_tails(grey + black, tasks + shaken, lines, progress)]
         for name in () if quick else APART:
-            body += ["", f"## {APART[name]}", "", *apart(name, Path(data), lines, progress)]
+            body += ["", f"## {APART[name]}", "", *section(name, Path(data), lines, progress)]
         body += ["", f"## {HALVES}", "", *_halves(grey, tasks, lines, progress)]
     else:
         lines.append(Line(contender="real logs", note="left out: UPRIGHT_REAL_DATA names no folder"))
@@ -131,9 +131,12 @@ def run(*, quick: bool, progress: Callable[[str], None], markdown: Path | None =
     body += ["", "## Lines that a user writes", "", *_lines(grey)]
     if markdown is not None:
         note = ", ".join(f"{name} {version(name)}" for name in _versions())
-        text = page("peers", "Peers", __doc__, ["", f"Versions: {note}.", *body], headline(lines))
-        markdown.write_text(text, encoding="utf-8")
+        markdown.write_text(_page([f"{VERSIONS}{note}.", *body], headline(lines)), encoding="utf-8")
     return lines
+
+
+def _page(body: Sequence[str], headline: str) -> str:
+    return page("peers", "Peers", __doc__, ["", *body], headline)
 
 
 def headline(lines: Sequence[Line]) -> str:
@@ -209,6 +212,7 @@ def _answers(pairs: Iterable[tuple[Peer, object]], progress) -> list:
 
 
 def _tails(peers, tasks, lines, progress) -> list[str]:
+    from benchmarks.peers.leads import Lead, explained
     from benchmarks.peers.task import fit_percent
 
     labels = [(task, label) for task in tasks for label in task.held_out]
@@ -231,18 +235,38 @@ def _tails(peers, tasks, lines, progress) -> list[str]:
                 means[peer.name].append(float(np.mean(percent)) if percent else None)
         body.append(f"| {peer.name} | {' | '.join(cells)} | {', '.join(seconds)} |")
         lines.append(Line(contender=f"held out: {peer.name}", note=", ".join(cells)))
-    return [_better(means, [f"{task.name}, {label}" for task, label in labels]), "", *body]
+    ahead = _ahead(means, labels)
+    leads = [
+        Lead(peer=name, run=run, task=task, theirs=solved[name, task.name], ours=solved["upright", task.name])
+        for name, (task, run), _ in ahead
+        if solved[name, task.name].values
+    ]
+    progress(f"why {len(leads)} leads")
+    collocated = next(peer for peer in GREY if peer.name == "opty").solve
+    better = _better([(name, f"{task.name}, {label}", points) for name, (task, label), points in ahead])
+    return [better, "", *body, *explained(leads, collocated, TIE)]
 
 
-def apart(name: str, data: Path, lines: list[Line], progress: Callable[[str], None]) -> list[str]:
-    """A section whose task has a module of its own: what it asks, who is better than upright, and the table."""
+def section(name: str, data: Path, lines: list[Line], progress: Callable[[str], None]) -> list[str]:
+    """One of `SECTIONS`, all peers that are installed."""
+    from benchmarks.peers.task import TAILS, driven, tail
+
+    if name in APART:
+        return _apart(name, data, lines, progress)
+    peers = [peer for all_ in (GREY, BLACK) for peer in _present(all_)[0]]
+    return _tails(peers, [*(tail(study, data) for study in TAILS), driven(data)], lines, progress)
+
+
+def _apart(name: str, data: Path, lines: list[Line], progress: Callable[[str], None]) -> list[str]:
+    """A section whose task has a module of its own: what it asks, who is better than upright, the table, and why."""
     code = importlib.import_module(f"benchmarks.peers.{name}")
-    rows = code.table(data, progress)
+    written = code.table(data, progress)
+    rows = list(takewhile(bool, written))
     found = _predictions(name, rows)
     lines += found
     labels = [cell.strip() for cell in rows[0].split("|")[2:-2]]
     means = {line.contender.partition(": ")[2]: [_mean(cell) for cell in line.note.split(", ")] for line in found}
-    return [*(code.__doc__ or "").strip().splitlines(), "", _better(means, labels), "", *rows]
+    return [*(code.__doc__ or "").strip().splitlines(), "", _better(_ahead(means, labels)), "", *written]
 
 
 def _predictions(question: str, rows: Sequence[str]) -> list[Line]:
@@ -251,15 +275,19 @@ def _predictions(question: str, rows: Sequence[str]) -> list[Line]:
     return [Line(contender=f"{question}: {own[0]}", note=", ".join(own[1:-1])) for own in cells]
 
 
-def _better(means: Mapping[str, Sequence[float | None]], labels: Sequence[str]) -> str:
-    """Who predicts better than upright, where, and by how many points."""
-    ahead = [
-        f"{name} on {label} ({other - own:.1f})"
+def _ahead(means: Mapping[str, Sequence[float | None]], labels: Sequence[T]) -> list[tuple[str, T, float]]:
+    """Who predicts better than upright, which run, and by how many points."""
+    return [
+        (name, label, other - own)
         for name, others in means.items()
         for label, own, other in zip(labels, means["upright"], others, strict=True)
         if own is not None and other is not None and other > own + TIE
     ]
-    who = "; ".join(ahead) or "nobody"
+
+
+def _better(ahead: Sequence[tuple[str, str, float]]) -> str:
+    """The same as a sentence."""
+    who = "; ".join(f"{name} on {label} ({points:.1f})" for name, label, points in ahead) or "nobody"
     return f"Better than upright by more than {TIE:g} points, in the mean of a run's signals: {who}."
 
 
@@ -277,15 +305,14 @@ def lines_in(text: str) -> list[Line]:
 
 
 def renewed(text: str, name: str, section: Sequence[str]) -> str:
-    """A published page with one section of `APART`, put before the halves, and the headline that then holds."""
+    """A published page with one of `SECTIONS`, a new one put before the halves, and the headline that then holds."""
     first, *parts = text.split("\n## ")
-    kept = [part for part in parts if not part.startswith(APART[name])]
-    place = next(k for k, part in enumerate(kept) if part.startswith(HALVES))
-    kept.insert(place, "\n".join([APART[name], "", *section, ""]))
-    text = "\n## ".join([first, *kept])
-    lines = text.splitlines()
-    lines[2] = f"**{headline(lines_in(text))}**"
-    return "\n".join(lines) + "\n"
+    titles = [part.partition("\n")[0] for part in parts]
+    title = SECTIONS[name]
+    place = titles.index(title) if title in titles else titles.index(HALVES)
+    parts[place : place + (title in titles)] = ["\n".join([title, "", *section, ""])]
+    text = "\n## ".join([first.rstrip("\n") + "\n", *parts])
+    return _page((VERSIONS + text.partition(VERSIONS)[2]).splitlines(), headline(lines_in(text)))
 
 
 def _halves(peers, tasks, lines, progress) -> list[str]:

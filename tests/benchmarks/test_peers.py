@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import upright as up
-from benchmarks.peers import black_boxes, ours, qube
+from benchmarks import measure, peers
+from benchmarks.peers import black_boxes, leads, ours, qube_fits, qube_starts
 from benchmarks.peers.task import Samples, Task, fit_percent, study_text
 
 M_P, L_CG, G = 0.2, 0.25, 9.81
@@ -83,9 +85,9 @@ def test_the_qube_of_the_peers_moves_as_the_plant_of_upright_does():
     motion = up.simulate(arm, u=np.append(gain * u, 0.0), seconds=400 * dt, dt=dt, start={"theta": "170 deg"})
     names = ("psi", "theta", "psi_dot", "theta_dot")
     states = motion.to_pandas()[list(names)].to_numpy()[:400]
-    run = qube.Episode(u=u, y=states[:, :2], states=states, dt=dt)
+    run = qube_fits.Episode(u=u, y=states[:, :2], states=states, dt=dt)
     first = run.starts(50)
-    y = qube.ahead(np.array([*p.values(), 0.0]), np.array([m_p, r, g, gain]), np.zeros(2), run, first, 50)
+    y = qube_fits.ahead(np.array([*p.values(), 0.0]), np.array([m_p, r, g, gain]), np.zeros(2), run, first, 50)
     assert y == pytest.approx(run.y[first[:, None] + 1 + np.arange(50)], abs=1e-5)
 
 
@@ -99,8 +101,8 @@ def test_arx_predicts_a_linear_plant_ahead_exactly(step):
         y[k] = [1.9, 1.8] * y[k - 1] - [0.97, 0.9] * y[k - 2] + [0.1, 0.05] * u[k - 1 : k]
     y, u = y - y[:1000].mean(axis=0), u - u[:1000].mean()
     y, u = y[::step], u[::step]
-    run = qube.Episode(u=u, y=y, states=np.zeros((y.shape[0], 4)), dt=0.01)
-    predicted = qube.arx([run], 4, 1)(run, 0.2)
+    run = qube_fits.Episode(u=u, y=y, states=np.zeros((y.shape[0], 4)), dt=0.01)
+    predicted = qube_fits.arx([run], 4, 1)(run, 0.2)
     at = run.starts(20) + 20
     assert predicted == pytest.approx(run.y[at], abs=1e-6 * float(np.abs(y).max()))
 
@@ -127,3 +129,36 @@ def test_output_error_finds_a_linear_plant_exactly():
     first, second, third = (carts.Run(u=v, y=carts._linear(x, v), dt=0.01) for v in u)
     predicted = carts.linear([first, second], output_error=True)(third)
     assert min(carts.percent(third, predicted)) > 99.99
+
+
+def test_nodes_between_samples_lie_on_the_swing():
+    fine = leads.finer(TASK, 4).fitted
+    assert fine.y[::4] == pytest.approx(TASK.fitted.y, abs=1e-12)
+    exact = 0.02 * np.exp(-DECAY * fine.t) * np.cos(OMEGA * fine.t)
+    # a cubic spline errs by (omega h)^4/384 inside, and by some ten times as much in its first piece
+    assert fine.y[:, 0] == pytest.approx(exact, abs=0.02 * 10 * (6 * 0.01) ** 4 / 384)
+
+
+def test_numbers_of_a_small_swing_explain_it_in_the_simulation_of_upright():
+    percents = leads.simulated(TASK, {"J_p": J_P, "b_2": B_2})
+    assert min(min(p) for p in percents.values()) > 99.9
+    wrong = leads.simulated(TASK, {"J_p": 1.5 * J_P, "b_2": B_2})
+    assert max(max(p) for p in wrong.values()) < 95
+
+
+def test_the_qube_twin_stays_upright_and_is_read_in_counts():
+    p = np.array([0.0645, 3.3e-5, 1e-4, 2.1e-4, 1e-4, 1e-3, 1.3e-3])
+    known = np.array([0.024, 0.085, 9.81, 5e-3])
+    first, second = qube_starts.balanced(p, known, range(2), 1000, 2e-3)
+    for run in (first, second):
+        assert np.abs(run.y[:, 1] - np.pi).max() < 0.3
+        counts = run.y * 2048 / (2 * np.pi)
+        assert counts == pytest.approx(np.round(counts), abs=1e-9)
+    assert np.abs(first.u - second.u).max() > 0.5
+
+
+@pytest.mark.parametrize("name", peers.SECTIONS)
+def test_a_section_put_in_its_own_place_leaves_the_page_as_it_is(name):
+    text = (Path(measure.__file__).parent / "peers.md").read_text(encoding="utf-8")
+    section = text.split(f"\n## {peers.SECTIONS[name]}\n\n")[1].split("\n\n## ")[0]
+    assert peers.renewed(text, name, section.split("\n")) == text
