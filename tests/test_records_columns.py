@@ -22,6 +22,8 @@ from upright.units import scale
         ("Zeit (ms)", 1e-3), ("temps", 1), ("ms", 1e-3), ("\u00b5s", 1e-6), ("s", 0),  # s may be a position
         ("millis", 1e-3), ("micros()", 1e-6), ("time_millis", 1e-3), ("time [seconds]", 1), ("t (sec)", 1),
         ("Time [msec]", 1e-3), ("t_usec", 1e-6), ("millis()", 1e-3), ("micros", 1e-6), ("t_seconds", 1), ("sec", 1),
+        ("Zeit/s", 1), ("t / ms", 1e-3), ("time, ms", 1e-3), ("Zeit in s", 1), ("Time (sec.)", 1), ("x/s", 0),
+        ("Time (milliseconds)", 1e-3), ("time [s, of arrival]", 1), ("Time (hh:mm:ss)", 0), ("m/s", 0),
         ("", 0), ("x [ms]", 0), ("t" + " " * 199, 1),
     ],
 )  # fmt: skip
@@ -41,6 +43,10 @@ def test_units_of_places_are_worth_what_pint_says(unit):
         ("x", ""), ("Pendel (\u00b0)", "deg"), ("arm [degrees]", "deg"), ("angle [Radians]", "rad"),
         ("x [V] raw", ""), ("k" * 300 + " [V]", "V"), ("Angle (deg, 0 = up)", "deg"), ("a (degrees; raw)", "deg"),
         ("a [m/s^2, filtered]", "m/s^2"), ("probe (1,5 V)", ""), ("a (left, right)", ""), ("a [, V]", ""),
+        # DIN 1313: a symbol through its unit; m/s is one unit, whatever stands before it
+        ("Zeit/s", "s"), ("\u03c6/rad", "rad"), ("U / V", "V"), ("omega/(rad/s)", "rad/s"), ("a [N/(m s)]", "N/(m s)"),
+        ("Angle, deg", "deg"), ("Weg in mm", "mm"), ("m/s", ""), ("v m/s", ""), ("v/m/s", ""), ("rad/s", ""),
+        ("dx/dt", ""), ("left/right", ""), ("encoder/A", ""), ("/arm/m", ""), ("u_V", ""), ("theta/", ""),
     ],
 )  # fmt: skip
 def test_a_unit_stands_in_brackets_behind_a_name(name, unit):
@@ -135,6 +141,7 @@ def test_a_description_of_columns_that_were_dropped_leaves_them_out():
     [
         ("theta [deg]", "theta"), ("theta (counts)", "theta"), ("theta_rad", "theta"), ("x_1", "x_1"), ("x_mm", "x"),
         ("u [V]", "u"), ("_m", "_m"), ("psi", "psi"), ("f(x) [m]", "f(x)"),
+        ("Winkel/deg", "Winkel"), ("omega/(rad/s)", "omega"), ("Angle, deg", "Angle"), ("m/s", "m/s"), ("u_V", "u_V"),
     ],
 )  # fmt: skip
 def test_a_name_without_its_unit(name, bare):

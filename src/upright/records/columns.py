@@ -22,20 +22,61 @@ LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _SPELLED = {"\u00b0": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "count": "counts"}
 _SPELLED |= {"volt": "V", "volts": "V", "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "newtons": "N"}
 _SPELLED |= {"second": "s", "seconds": "s", "meter": "m", "meters": "m", "metre": "m", "metres": "m"}
-_LONGEST = 200  # characters of a name that is looked into
 # the names are case-folded, which makes the micro sign a Greek letter
 _UNIT_SUFFIX = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "\u03bcs": 1e-6, "ns": 1e-9}
-_UNIT_SUFFIX |= {"msec": 1e-3, "usec": 1e-6}
+_UNIT_SUFFIX |= {"msec": 1e-3, "usec": 1e-6, "milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
 _UNIT_SUFFIX |= {"millis": 1e-3, "millis()": 1e-3, "micros": 1e-6, "micros()": 1e-6}  # Arduino's clocks
+
+
+_APART = ("/", ",", " in ")
+_ALONE = {*ANGLES, *LENGTHS, "counts", "V", "mV", "mA", "N"}
+"""What parts a name from a unit without brackets, and the units that are read there beside times and full words.
+
+An A is none: channels are called so.
+"""
+
+
+def split_heading(name: str) -> tuple[str, str]:
+    """A column's name and the unit behind it, as it is written there; empty where none is.
+
+    In brackets anything may be one, and what follows it after a comma is a remark: ``theta [deg, 0 = up]``. Behind a
+    slash, a comma or the word "in" a unit is one that logs are full of, ``Zeit/s`` or ``Angle, deg``, and no part of
+    another unit, as in ``m/s``.
+    """
+    name = name.strip()
+    at = _opening(name)
+    inside = name[at + 1 : -1].strip() if at >= 0 else ""
+    unit = inside if inside[:1].isdigit() else re.split(r"[,;]", inside, maxsplit=1)[0].rstrip(" .")
+    if unit:
+        return name[:at].rstrip(" /"), unit
+    for mark in _APART:
+        stem, _, unit = (part.strip() for part in name.rpartition(mark))
+        if stem and mark not in stem and stem.split()[-1] not in _ALONE and _is_alone(unit):
+            return stem, unit
+    return name, ""
+
+
+def _opening(name: str) -> int:
+    """Place of the bracket that the last character closes; -1 where it closes none."""
+    depth = 0
+    for at in range(len(name) - 1, -1, -1):
+        depth += (name[at] in ")]") - (name[at] in "([")
+        if depth == 0:
+            return at if name[at] in "([" else -1
+    return -1
+
+
+def _is_alone(unit: str) -> bool:
+    return unit in _ALONE or unit.casefold() in _UNIT_SUFFIX or unit.casefold() in _SPELLED
 
 
 def time_scale(name: str) -> float:
     """Seconds per unit of a column that is called like a time; 0 when it is not.
 
-    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"``, ``"t_us"``, ``"ms"`` and Arduino's ``"millis"`` are.
+    ``"t"``, ``"Time"``, ``"time [ms]"``, ``"Time (s)"``, ``"Zeit/s"``, ``"t_us"``, ``"ms"`` and Arduino's ``"millis"``
+    are.
     """
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(]\s*(\w+)\s*(?:[,;][^\[\]()]*)?[\])])?\s*", name[:_LONGEST].casefold())
-    stem, unit = (match[1], match[2] or "") if match else ("", "")
+    stem, unit = (part.casefold() for part in split_heading(name))
     if stem in TIME_NAMES:
         return _UNIT_SUFFIX.get(unit, 0.0) if unit else 1.0
     if not unit and len(stem) > 1 and stem in _UNIT_SUFFIX:  # "s" may be a position
@@ -50,24 +91,17 @@ def stated_time_unit(name: str) -> float:
 
 
 def stated_unit(name: str) -> str:
-    """Unit in brackets behind a name, as in ``theta [rad]``; empty when there is none that can be read.
-
-    What follows it after a comma is a remark, as in ``theta [deg, 0 = up]``.
-    """
-    match = re.fullmatch(r".*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*", name[-_LONGEST:])
-    if match is None:
-        return ""
+    """Unit behind a name, as in ``theta [rad]``, see `split_heading`; empty when there is none that can be read."""
     from upright.units import known
 
-    unit = match[1] if re.match(r"\d", match[1]) else re.split(r"\s*[,;]", match[1])[0]
+    _, unit = split_heading(name)
     unit = _SPELLED.get(unit.casefold(), unit)
     return unit if known(unit) else ""
 
 
 def bare_name(name: str) -> str:
     """A name without its unit: ``theta`` of ``theta [deg]``, ``theta (counts)`` and ``theta_rad``."""
-    bare = re.sub(r"\s*[\[(][^\[\]()]*[\])]\s*$", "", name[:_LONGEST]).strip()
-    return re.sub(r"(?<=\w)_(rad|deg|rev|m|cm|mm|counts?)$", "", bare)
+    return re.sub(r"(?<=\w)_(rad|deg|rev|m|cm|mm|counts?)$", "", split_heading(name)[0])
 
 
 def take_time(frame: Any, name: str | None = None) -> tuple[NDArray[np.float64], Any]:
