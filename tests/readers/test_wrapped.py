@@ -8,7 +8,7 @@ import pytest
 from upright.errors import BadInput
 from upright.readers import read_source
 from upright.readers.source import Source
-from upright.readers.wrapped import counting_on, unwrapped
+from upright.readers.wrapped import counting_on, counts_per_turn, turned_on, unwrapped
 
 T = 0.002 * np.arange(4000)
 TURNS = np.round(16000 / (2 * np.pi) * (30 * T + 4 * np.sin(3 * T)))
@@ -57,6 +57,45 @@ def test_the_record_says_which_column_was_counted_on_and_how_often():
     assert f"'enc' is a counter of 16 bits and passed its end {passed} times; it is counted on here." in (
         record.provenance.notes
     )
+
+
+ANGLE = 6 * np.sin(0.7 * T) + 3 * np.sin(2.1 * T)  # goes round once and a half each way
+
+
+@pytest.mark.parametrize(("bits", "turn"), [(12, 4096), (13, 8192), (14, 16384), (16, 0)])
+def test_a_magnetic_encoder_begins_again_after_a_turn_and_a_timer_s_counter_after_many(bits, turn):
+    counts = np.round(2.0**bits * ANGLE / (2 * np.pi))
+    rows = "\n".join(f"{t:.3f},{c:.0f}" for t, c in zip(T, counts % 2**bits, strict=True))
+    record = read_source(Source(file="log.csv", data=f"time,arm #1\n{rows}\n".encode()))
+    np.testing.assert_array_equal(record["arm #1"] - record["arm #1"][0], counts - counts[0])
+    assert counts_per_turn("arm #1", record.provenance.notes) == turn
+    assert counts_per_turn("arm", record.provenance.notes) == 0
+
+
+@pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2 * np.pi), ("rev", 1.0)])
+@pytest.mark.parametrize("lowest", [0.0, -0.5])
+def test_an_angle_that_begins_again_after_a_turn_goes_on(unit, turn, lowest):
+    angle = turn * ANGLE / (2 * np.pi)
+    logged = np.round((angle - lowest * turn) % turn + lowest * turn, 4)
+    on, times = turned_on(logged, unit)
+    np.testing.assert_allclose(on - on[0], angle - angle[0], atol=1.01e-4)
+    assert times == int((np.diff((angle - lowest * turn) // turn) != 0).sum())
+
+
+@pytest.mark.parametrize(
+    "angle",
+    [
+        180 * np.sign(np.sin(3 * T)),  # a square wave that is to be followed
+        170 * np.sin(3 * T),  # never as far as a turn
+        (360 * ANGLE[::200] / (2 * np.pi)) % 360,  # so seldom that half a turn is a step
+        720 * np.sin(3 * T),
+    ],
+    ids=["square", "short", "seldom", "on and on"],
+)
+def test_an_angle_that_does_not_begin_again_stays_as_it_is(angle):
+    same, times = turned_on(angle, "deg")
+    np.testing.assert_array_equal(same, angle)
+    assert times == 0
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,9 @@ from upright.errors import BadInput
 from upright.readers.inspection import Inspection, inspect_record
 from upright.readers.reader import READERS, Reader
 from upright.readers.source import Source, load
-from upright.readers.wrapped import unwrapped
+from upright.readers.wrapped import counted_on, turned_on, unwrapped
 from upright.records import PathLike, Record
+from upright.records.columns import ANGLES
 
 __all__ = ["READERS", "inspect", "read", "reader_of"]
 
@@ -49,13 +50,14 @@ def read_source(source: Source, *, reader: str | None = None) -> Record:
 
 
 def _unwrapped(record: Record) -> Record:
-    """The record with every counter that passed its end counted on."""
+    """The record with every counter and angle that passed its end counted on."""
     signals, notes = dict(record.signals), list[str]()
     for name, values in record.signals.items():
         signals[name], bits, times = unwrapped(values)
+        if not times and record.units[name] in ANGLES:
+            signals[name], times = turned_on(values, record.units[name])
         if times:
-            passed = "once" if times == 1 else f"{times} times"
-            notes.append(f"'{name}' is a counter of {bits} bits and passed its end {passed}; it is counted on here.")
+            notes.append(counted_on(name, bits, times))
     if not notes:
         return record
     origin = record.provenance

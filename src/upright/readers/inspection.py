@@ -16,6 +16,7 @@ import numpy as np
 from upright import units
 from upright.errors import BadInput, nearest
 from upright.readers.resolution import Resolution, counts_per_rev, resolution_of, rounding
+from upright.readers.wrapped import counts_per_turn
 from upright.records import Array, Record
 from upright.renamed import former
 from upright.signals.stretches import stretches
@@ -82,7 +83,8 @@ class Column:
     `unit` is stated by the log, `guess` ours when it is not; `low_share` and `high_share`: share of the samples
     pinned at the lowest and highest value (0 unless they stay there); `turns`: whole revolutions in the offset;
     `switches`: (time [s], new value) of a drive, at every step when it is `stepwise`, else where it leaves 0 and
-    returns; `idle`: a drive that never leaves 0; `remarks`: what it is besides a measurement (derived, mislabelled).
+    returns; `idle`: a drive that never leaves 0; `remarks`: what it is besides a measurement (derived, mislabelled);
+    `counts_per_turn`: after which an absolute sensor began again, 0 where none did.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Column:
     switches: tuple[tuple[float, float], ...]
     stepwise: bool
     remarks: tuple[str, ...]
+    counts_per_turn: int = 0
     lies = former("remarks")
 
 
@@ -193,6 +196,7 @@ def _column(record: Record, name: str) -> Column:
         switches=_switches(record.t, x) if drive and not constant else (),
         stepwise=0 < int(np.count_nonzero(np.diff(x))) <= _SHOWN,
         remarks=remarks(record, name),
+        counts_per_turn=counts_per_turn(name, record.provenance.notes),
     )
 
 

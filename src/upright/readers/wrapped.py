@@ -1,12 +1,18 @@
-"""Counters and clocks of few bits that went beyond their end, as if they had more."""
+"""Counters, clocks and angles that went beyond their end and began again, as if they had gone on."""
 
 from __future__ import annotations
+
+import re
+from collections.abc import Iterable
 
 import numpy as np
 
 from upright.records import Array
+from upright.records.columns import ANGLES
 
-BITS = (8, 16, 32)
+ABSOLUTE = (12, 13, 14)
+"""Bits of sensors that tell an angle at once, as magnetic encoders do: they begin again after a turn."""
+BITS = (8, *ABSOLUTE, 16, 32)
 FULL = 0.9
 """Share of its range that a counter which passes its end has been through."""
 SWIFT = 1 / 8
@@ -19,6 +25,10 @@ FEWEST = 50
 """Different readings: what bangs from end to end is a command."""
 
 
+_COUNTER = "'{}' is a counter of {} bits and passed its end {}; it is counted on here."
+_TURNS = "'{}' began again after a turn, {}; it is counted on here."
+
+
 def unwrapped(values: Array) -> tuple[Array, int, int]:
     """Readings (N,) of a counter without its jumps from end to end, its bits, and how often it passed an end.
 
@@ -29,15 +39,49 @@ def unwrapped(values: Array) -> tuple[Array, int, int]:
         whole = 2.0**bits
         if not _within(low, high, whole) or high - low < FULL * whole:
             continue
-        steps = np.abs(np.diff(values))
-        jumps = steps > (1 - SWIFT) * whole
-        if not jumps.any() or (steps[~jumps] > SWIFT * whole).any() or (values != np.round(values)).any():
+        if (values != np.round(values)).any():
             return values, 0, 0
-        if np.unique(values).size < FEWEST:
-            return values, 0, 0
-        turns = np.concatenate([[0.0], np.cumsum(-np.sign(np.diff(values)) * jumps)])
-        return values + whole * turns, bits, int(jumps.sum())
+        on, times = _without_jumps(values, whole)
+        return on, bits if times else 0, times
     return values, 0, 0
+
+
+def turned_on(values: Array, unit: str) -> tuple[Array, int]:
+    """Angles (N,) without their jumps by a turn, and how often they began again; as they are, and 0, where none did.
+
+    `unit` is that of an angle.
+    """
+    whole = 2 * np.pi / ANGLES[unit]
+    low, high = float(values.min()), float(values.max())
+    slack = SLACK * whole
+    inside = (low >= -whole / 2 - slack and high <= whole / 2 + slack) or (low >= -slack and high <= whole + slack)
+    return _without_jumps(values, whole) if inside and high - low >= FULL * whole else (values, 0)
+
+
+SLACK = 1e-3
+"""Of a turn, what digits and noise may add to it."""
+
+
+def _without_jumps(values: Array, whole: float) -> tuple[Array, int]:
+    steps = np.abs(np.diff(values))
+    jumps = steps > (1 - SWIFT) * whole
+    if not jumps.any() or (steps[~jumps] > SWIFT * whole).any() or np.unique(values).size < FEWEST:
+        return values, 0
+    turns = np.concatenate([[0.0], np.cumsum(-np.sign(np.diff(values)) * jumps)])
+    return values + whole * turns, int(jumps.sum())
+
+
+def counted_on(name: str, bits: int, times: int) -> str:
+    """Note on a column: a counter of so many bits, or an angle where there are none."""
+    often = "once" if times == 1 else f"{times} times"
+    return _COUNTER.format(name, bits, often) if bits else _TURNS.format(name, often)
+
+
+def counts_per_turn(name: str, notes: Iterable[str]) -> int:
+    """Counts after which an absolute sensor began again, by the notes on its column; 0 for any other."""
+    note_of_it = re.compile(re.escape(_COUNTER).replace(r"\{\}", "{}").format(re.escape(name), r"(\d+)", ".*"))
+    bits = next((int(match[1]) for note in notes if (match := note_of_it.fullmatch(note))), 0)
+    return 2**bits if bits in ABSOLUTE else 0
 
 
 def counting_on(ticks: Array) -> tuple[Array, int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 
 import numpy as np
@@ -66,3 +67,34 @@ def test_with_what_a_person_can_measure_the_rest_is_the_rig_that_was_driven(fold
     assert {"l_cg", "J_d", "b_1", "b_1c", "actuator.gain"} <= {
         name for name, e in fit.estimates.items() if e.half < 0.02 and e.status == "well determined"
     }
+
+
+def magnetic(bits: int = 14, hangs: int = 15000) -> str:
+    """The same rig with encoders that begin again after a turn, released by hand; the pendulum's counts backwards."""
+    t = np.arange(0.0, 16.0, 5e-3)
+    duty = np.round(90 * np.sin(4.4 * t + 2 * np.sin(0.4 * t))) * (t > 6)
+    motion = up.simulate(BUILT, u=GAIN * duty, start={"psi": 2.6, "theta": 2.2}, seconds=16.0, dt=5e-3)
+    turn = 2**bits
+    arm, pend = (np.round(motion[n][: t.size] * turn / (2 * np.pi)) for n in ("psi", "theta"))
+    rows = zip(1e3 * t, (arm + 200) % turn, (hangs - pend) % turn, duty, strict=True)
+    return "ms,arm,pendulum,pwm\n" + "".join(f"{m:.0f},{a:.0f},{p:.0f},{d:.0f}\n" for m, a, p, d in rows)
+
+
+@pytest.mark.slow
+def test_magnetic_encoders_say_themselves_what_a_turn_is(tmp_path):
+    (tmp_path / "board.csv").write_text(magnetic(), encoding="utf-8")
+    up.init(tmp_path / "board.csv", out=tmp_path / "study.toml")
+    text = (tmp_path / "study.toml").read_text(encoding="utf-8")
+    study = tomllib.loads(text)
+    sensors = study["sensors"]
+    assert [sensors[n]["counts_per_rev"] for n in ("psi", "theta")] == 2 * [{"value": 2**14, "measured": True}]
+    assert sensors["theta"]["sign"] == -1
+    off = (sensors["theta"]["offset"] - 15000 + 2**13) % 2**14 - 2**13
+    assert abs(off) < 0.1 * 2**14 / (2 * np.pi)  # it still swings by twice as much where it begins to be driven
+    for given in ('m_p = "120 g"', 'l_cg = "17 cm"', 'J_p = { guess = "1e-4 kg m^2" }'):
+        text = re.sub(rf"(?m)^{given.partition(' ')[0]} = .*$", given, text)
+    (tmp_path / "measured.toml").write_text(text, encoding="utf-8")
+    fit = up.identify(tmp_path / "measured.toml").value
+    assert fit.trusted
+    truth = BUILT.parameters() | {"actuator.gain": GAIN}
+    assert [n for n, e in fit.estimates.items() if not e.interval[0] <= truth[n] <= e.interval[1]] == []

@@ -26,7 +26,7 @@ from upright.study.draft.accelerating import HEAVY
 from upright.study.draft.described import counts_of
 from upright.study.draft.hinge import hinge_of
 from upright.study.draft.plausible import implausible
-from upright.study.draft.recognise import Recognised, pushed_coordinate
+from upright.study.draft.recognise import Recognised, per_reading, pushed_coordinate
 from upright.study.draft.tables import (
     assumed,
     command_unit,
@@ -133,14 +133,14 @@ def balance_of(record: Record, recognised: Recognised) -> Balanced | None:
     """How a pendulum is balanced, None when it hangs, or swings, or nothing works to keep it up."""
     if recognised.plant not in ("cart-pendulum", "furuta") or recognised.drive is None or len(recognised.columns) < 2:
         return None
-    first, last = (record[c.name] * _si(c.guess) for c in recognised.columns.values())
+    first, last = (record[c.name] * per_reading(c) for c in recognised.columns.values())
     u = command_unit(recognised.drive)[1] * record[recognised.drive.name]
     centre = float(np.median(last))
     tilt = last - centre
     if np.abs(tilt).max() > SMALL or np.mean(np.abs(u) > 1e-3 * np.abs(u).max()) < BUSY:
         return None
     dt = float(record.t[-1] - record.t[0]) / (record.t.size - 1)
-    steps = [(c.resolution.step or 0.0) * _si(c.guess) for c in recognised.columns.values()]
+    steps = [(c.resolution.step or 0.0) * per_reading(c) for c in recognised.columns.values()]
     wide = max(acceleration_width(x, dt, step) for x, step in zip((first, tilt), steps, strict=True))
     width = max(7, int(min(max(wide, SMOOTHED[0] / dt), SMOOTHED[1] / dt)) | 1)
     if record.t.size < 30 * width:
@@ -162,7 +162,7 @@ def recognised_upright(recognised: Recognised, balanced: Balanced) -> Recognised
     """What was recognised, with signs and the reading of the pendulum's zero, half a turn from upright."""
     mirrored = balanced.throw < 0
     last = list(recognised.columns)[-1]
-    scale = _si(recognised.columns[last].guess)
+    scale = per_reading(recognised.columns[last])
     zero = (balanced.centre + (math.pi if mirrored else -math.pi)) / scale
     return replace(
         recognised, reversed=balanced.pull < 0, throw=balanced.throw, rest={**recognised.rest, last: zero},
@@ -352,7 +352,3 @@ def _runs(record: Record, recognised: Recognised, file: str, label: str) -> list
         return run_tables(file, [(f"{label} start", start, split, "fit"), (f"{label} tail", split, stop, "predict")])
     moved = recognised.drive if len(recognised.columns) > 1 else None
     return run_tables(file, driven_runs(record, moved, recognised.window, recognised.frequency, label))
-
-
-def _si(unit: str) -> float:
-    return {"counts": 2 * math.pi / 4096, **ANGLES, **LENGTHS}.get(unit, 1.0)

@@ -118,6 +118,10 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         doubts.append(f"'{drive.name}' is the only column in V or A beside what moves: taken for the command.")
     degrees = [c.name for c in columns.values() if c.guess == "deg" and inspection.column(c.name).guess == "rad"]
     doubts += [f"'{name}' swings to and fro by more than half a turn in rad: taken for degrees." for name in degrees]
+    doubts += [
+        f"'{c.name}' begins again after {c.counts_per_turn} counts: taken for one turn." for c in columns.values()
+        if c.guess == "counts" and c.counts_per_turn
+    ]  # fmt: skip
     doubts += [f"No column was found for {name}; lock it, leave it unmeasured or name its column." for name in missing]
     last = record[list(columns.values())[-1].name]
     pushed = plant in ("cart-pendulum", "furuta") and len(columns) > 1
@@ -146,8 +150,8 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
             window, earlier = swings[-1], tuple(swings[:-1])
         inside = (record.t >= window[0]) & (record.t <= window[1])
     throw = 0.0
-    if pushed and all(c.guess in ANGLES or name == "x" for name, c in columns.items()):
-        first, hanging = (_SI.get(c.guess, 1.0) for c in columns.values())
+    if pushed and all(c.guess in (*ANGLES, "counts") or name == "x" for name, c in columns.items()):
+        first, hanging = (per_reading(c) for c in columns.values())
         angle = hanging * (last[inside] - centre)
         throw = coupling(find(plant), record.t[inside], first * driven[inside], angle)
     return Recognised(
@@ -164,6 +168,11 @@ def recognise(record: Record, inspection: Inspection, plant: str = "") -> Recogn
         earlier=earlier,
         accelerates=accelerates,
     )
+
+
+def per_reading(c: Column) -> float:
+    """What one unit of a column is [SI]; one count is that of a usual encoder, where no turn of the sensor was seen."""
+    return 2 * math.pi / (c.counts_per_turn or 4096) if c.guess == "counts" else _SI.get(c.guess, 1.0)
 
 
 def _of_sensors(inspection: Inspection) -> str:
@@ -384,7 +393,7 @@ def zero_reading(
             return begins
         if before.size and not (hangs and not _starts_still(x, u)):
             return float(np.median(before[-50:]))
-        return rest_level(x, inspection, record.t) if angle else begins
+        return rest_level(x, inspection, record.t) if angle or hangs else begins
     return rest_level(x, inspection, record.t)
 
 

@@ -93,12 +93,16 @@ def sensor_table(
     `mirrored`: it counts against the coordinate.
     """
     name, turns = coordinate.name, coordinate.unit == "rad"
+    count: dict[str, Value]
     table = TomlTable(f"[sensors.{name}]")
     table.key("column", c.name, f"{c.low:.6g} to {c.high:.6g} {c.guess}".rstrip())
     if c.guess:
         table.key("unit", c.guess, "" if c.unit else "guessed; the log does not say")
-    if c.guess == "counts":
-        count: dict[str, Value] = {"value": counts[0], "assumed": True}
+    if c.guess == "counts" and turns and c.counts_per_turn:
+        count = {"value": c.counts_per_turn, "measured": True}
+        table.key("counts_per_rev", count, "after which the column begins again, as after a turn")
+    elif c.guess == "counts":
+        count = {"value": counts[0], "assumed": True}
         table.key("counts_per_rev" if turns else "counts_per_m", count, f"MEASURE: {counts[1]}")
     elif c.resolution.counts_per_rev and turns:
         table.key("counts_per_rev", {"value": c.resolution.counts_per_rev, "measured": True}, "from the column's steps")
