@@ -14,6 +14,8 @@ from urllib.request import HTTPRedirectHandler, build_opener
 import pytest
 from websockets.sync.client import connect
 
+from tests.browser.test_fit_in_use import DESIGN, written_fit
+from tests.browser.test_fits import ask
 from tests.browser.test_served import got
 from tests.realtime.test_process import ours, until
 from upright.browser.classroom.overview import STATES
@@ -140,6 +142,36 @@ def test_a_class_at_work(roster, tmp_path):
         assert len(again.rows) == len(log) > 100
     assert [event.kind for event in logs[1].events] == ["law", "fault"]
     assert not list(tmp_path.glob("*/*.rows"))
+
+
+def test_a_fit_in_use_gives_one_student_its_gains_and_the_twin_stays_theirs(roster, tmp_path):
+    """The log replays to the bit, so that the lane had the gains of the law that was designed for the fit."""
+    written_fit(tmp_path / "bob", "fit-1")
+    with open_bench([], [], tmp_path, roster=roster, fifo=False) as bench, student(bench.url, "bob") as bob:
+        nominal = reads(bob, lambda note: note["type"] == "scene")
+
+        def use(**what):
+            body = json.dumps(what).encode()
+            return ask(bench, "api/rigs/bob/model", nominal["you"], data=body, wait=DESIGN)[::2]
+
+        assert use(fit="fit-1") == (200, "{}")
+        scene = reads(bob, lambda note: note["type"] == "scene" and note["model"]["fit"])
+        assert (scene["title"], scene["K"] == nominal["K"]) == ("Bob", False)
+        assert use(memory=0.9) == (
+            400,
+            "The twins of a class have one velocity filter; upright bench by itself takes another.",
+        )
+        asks(bob, do="start", seconds=0.5)
+        assert sees(bob, "ended", "stopped")["state"] == "ended"
+        rig = bench.stations[1].rig
+        assert until(lambda: (tmp_path / "bob/run.json").exists(), 120.0)
+        assert bench.stations[0].rig.loop.K[0].tolist() == nominal["K"]
+        assert use(fit="")[0] == 200
+        assert reads(bob, lambda note: note["type"] == "scene" and not note["model"]["fit"])["K"] == nominal["K"]
+    log = read_log(tmp_path / "bob/run.mcap")
+    assert replay(log).identical
+    assert (log.header.law["C"], log.header.law["D"]) == (rig.law.C.tolist(), rig.law.D.tolist())
+    assert "seed" not in log.header.rig
 
 
 def children(process, of=b""):

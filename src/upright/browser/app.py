@@ -62,7 +62,7 @@ NOT_BUILT = (
 )
 
 
-ONE_MODEL = "in a class all know the same rig; upright bench by itself takes a fit for its model."
+ONE_FILTER = "the twins of a class have one velocity filter; upright bench by itself takes another."
 
 
 def is_built() -> bool:
@@ -106,7 +106,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
         name = request.path_params["name"]
         if name not in hubs:
             return nothing()
-        rig = hubs[name].station.rig  # a class knows one rig, by one law
+        rig = hubs[name].station.rig  # a class knows one rig, by one law and those of its fits
         if rig.law_path not in scripts:
             scripts[rig.law_path] = asyncio.create_task(asyncio.to_thread(in_own_process, twin_script, rig))
         try:
@@ -189,7 +189,7 @@ def application(stations: Sequence[Station], room: Classroom | None = None) -> S
             Route("/", page), Route("/assets/{name}", asset), Route("/api/rigs", rigs),
             Route("/api/rigs/{name}/runs", runs), Route("/rigs/{name}/twin.js", script),
             Route("/rigs/{name}/runs/{file}", result), WebSocketRoute("/live/{name}", live),
-            *identify_routes(hubs, fits, readable, fixed="" if room is None else ONE_MODEL),
+            *identify_routes(hubs, fits, readable, fixed="" if room is None else ONE_FILTER),
             WebSocketRoute("/class", whole),
         ],
     )  # fmt: skip

@@ -81,6 +81,8 @@ class Station:
         Gives the desk of a run that is requested.
     plan : callable
         Gives the plan of a sweep or a step.
+    known : callable
+        Gives a rig by another description as this one may take it up, or refuses it; it may take a while.
 
     Attributes
     ----------
@@ -119,6 +121,7 @@ class Station:
         swing_up: Callable[[BenchRig, Path], str] = swing_up_apart, clock: Callable[[], float] = time.monotonic,
         desk: Callable[[RunRequest], RunDesk] = lambda _: Desk(),
         plan: Callable[[BenchRig, str], RecordingPlan] = recording_plan,
+        known: Callable[[BenchRig], BenchRig] = lambda rig: rig,
     ) -> None:  # fmt: skip
         self.rig, self.folder, self.lease = rig, folder, Lease(clock)
         self.state, self.why, self.verdict, self.seconds = IDLE, "", "", 0.0
@@ -130,7 +133,7 @@ class Station:
         self._accepted, self._fifo, self._ending = "", fifo, False
         self._lock, self._thread = threading.Lock(), None
         self._carry, self._report, self._clock, self._beat = carry, report, clock, clock()
-        self._new_desk, self._plan, self.writing = desk, plan, 0
+        self._new_desk, self._plan, self.known, self.writing = desk, plan, known, 0
         self.recording: Recording | None = None
         self.last_use: LastUse | None = None
 

@@ -34,7 +34,8 @@ class SharedLanes:
         context = multiprocessing.get_context("spawn")
         n, m = lanes, coordinates
         self._orders = np.dtype(
-            [("run", "<i8"), ("stop", "<i8"), ("away", "<f8"), ("signal", "<i8"), ("ticks", "<i8"),
+            [("run", "<i8"), ("stop", "<i8"), ("away", "<f8"), ("signal", "<i8"), ("begins", "<i8"),
+             ("ticks", "<i8"),
              ("taps", "<f8", (m,)),
              ("given", "<i8"), ("shape", "<i8"), ("size", "<f8"), ("period", "<f8"), ("change", "<i8"),
              ("gains", "<i8"), ("numbers", "<f8", (NUMBERS,))]

@@ -130,6 +130,8 @@ class Attendant:
             away = np.zeros(2 * len(self._per))
             away[-2] = orders["away"][lane]
             self.lanes.begin(lane, away.tolist())
+            if begins := int(orders["begins"][lane]):
+                self.lanes.gains(lane, orders["numbers"][lane][:begins].tolist())
 
     def _heed(self, lane: int, head: int) -> None:
         order, answer = self._orders[lane], self._answers[lane]

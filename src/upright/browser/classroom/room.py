@@ -17,6 +17,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from upright.browser.classroom.judge import Judge
 from upright.browser.classroom.log import NO_REPORT, row_of, rows_of, write_lane_log
 from upright.browser.classroom.memory import (
     BY_HAND,
@@ -52,7 +53,7 @@ from upright.realtime.reference import SHAPES, Reference
 from upright.realtime.session import RunEnd, RunOrder, RunState
 from upright.rigs.law import for_rig
 from upright.rigs.protocol import NO_FAULT, Fault, Mode
-from upright.running.rig import about_what_is_held, model_and_truth, stage_of
+from upright.running.rig import model_and_truth
 from upright.running.run import PreparedRun, RunRequest
 
 POLL = 0.05
@@ -66,14 +67,14 @@ class LaneDesk:
 
     def __init__(
         self, shared: SharedLanes, lane: int, tilt: float, target: tuple[float, ...],
-        judge: Callable[[Law], tuple[str, Law]], signal: int = 0,
+        judge: Callable[[Law], tuple[str, Law]], signal: int = 0, law: Law | None = None,
     ) -> None:  # fmt: skip
         self._orders, self._answers, self._marks = shared.orders(), shared.answers(), shared.marks()
         self._ring, self._late, self._applied = shared.counts(), shared.late(), shared.numbers("command")
         self.lane, self.run, self.tilt = lane, int(self._orders["run"][lane]) + 1, tilt
         self._judge, self._refused, self._changes, self.target, self._signal = judge, "", 0, target, signal
         self._first, self._requested = int(self._orders["given"][lane]) + 1, dict[int, Reference]()
-        self.stopping, self._begun = False, False
+        self.stopping, self._begins = False, [] if law is None else _gains(law)
         self.events: list[tuple[int, Law]] = []
 
     @property
@@ -82,8 +83,9 @@ class LaneDesk:
         return bool(self._answers["run"][self.lane] >= self.run)
 
     def begin(self, ticks: int) -> None:
-        """Ask for the run."""
-        order = self._orders[self.lane]
+        """Ask for the run, under gains of its own where it has them."""
+        order, n = self._orders[self.lane], len(self._begins)
+        order["numbers"][:n], order["begins"] = self._begins, n
         order["away"], order["ticks"], order["signal"] = self.tilt, ticks, self._signal
         order["run"] = self.run
 
@@ -121,7 +123,7 @@ class LaneDesk:
         if order["change"] != answer["changed"]:
             return False
         why, fitted = self._judge(law)
-        numbers = [*fitted.C.ravel().tolist(), *fitted.D.ravel().tolist()]
+        numbers = _gains(fitted)
         self._refused = why or ("the law has too many gains." if len(numbers) > NUMBERS else "")
         self._changes += 1
         if not self._refused:
@@ -161,6 +163,11 @@ class LaneDesk:
         rows["command"] = rows["applied"] = self._applied[places, self.lane]
         rows["late"] = self._late[places] - self._answers["late"][self.lane]
         return end - first, rows
+
+
+def _gains(law: Law) -> list[float]:
+    """C and D, row by row."""
+    return [*law.C.ravel().tolist(), *law.D.ravel().tolist()]
 
 
 @dataclass(eq=False)
@@ -218,20 +225,16 @@ class Classroom:
                 f"the twins of a class are held by feedback of states, and the law of {rig.name} is another."
             )
         self.rig, self.students = rig, tuple(students)
-        stage = stage_of(rig.rig_path, balance=True)
-        self._beside, self._lock = stage.supervisor, threading.Lock()
-        self._about = self._beside.prepare()
-        stage.bring()
-        law = self._beside.aim(about_what_is_held(rig.law, rig.model, rig.at, rig.zero))
-        assert isinstance(law, Law)  # as the one it was made of
-        self.law, self._units = law, stage.units
-        self._beside.start()
+        self._judge = Judge(rig)
+        self._others: dict[int, dict[Path, Judge]] = {}
+        self._about, self._held, self._units = self._judge.about, self._judge.held, self._judge.units
+        self.law = law = self._judge.law
         self._plans = _plans(rig) if law.signal().shape[1] else {}  # a signal goes the way of a reference
-        self._held_at = np.full(len(students), self._beside.target[-1])
-        self._shared = SharedLanes(len(students), len(stage.units))
+        self._held_at = np.full(len(students), self._judge.target[-1])
+        self._shared = SharedLanes(len(students), len(self._units))
         self._order = LanesOrder(
             rigs=[model_and_truth(replace(rig.file, seed=student.seed))[1] for student in students], at=rig.at,
-            zero=rig.zero, law=law, travel=self._beside.held.travel, lean=self._beside.duty.lean, fifo=fifo,
+            zero=rig.zero, law=law, travel=self._held.travel, lean=self._judge.lean, fifo=fifo,
             signals=[plan.signal.samples for plan in self._plans.values()],
         )  # fmt: skip
         self._runs: dict[int, LaneRun] = {}
@@ -285,7 +288,7 @@ class Classroom:
         known = replace(self.rig, name=student.address, model=model, file=file)
         return Station(
             known, folder / student.address, carry=self._carry, report=self._write, swing_up=_no_swing_up,
-            desk=partial(self._desk, lane), plan=self._plan,
+            desk=partial(self._desk, lane), plan=self._plan, known=partial(self._known, lane),
         )  # fmt: skip
 
     def _plan(self, rig: BenchRig, kind: str) -> RecordingPlan:
@@ -294,30 +297,42 @@ class Classroom:
 
     def _desk(self, lane: int, request: RunRequest) -> LaneDesk:
         plans = [plan.request for plan in self._plans.values()]
-        self._held_at[lane] = 0.0 if request in plans else self._beside.target[-1]
+        self._held_at[lane] = 0.0 if request in plans else self._judge.target[-1]
         if request in plans:
             hanging = (0.0,) * len(self._units)
-            return LaneDesk(self._shared, lane, 0.0, hanging, self._judged, 1 + plans.index(request))
+            return LaneDesk(self._shared, lane, 0.0, hanging, self._judge.of, 1 + plans.index(request))
         if request.samples is not None:
             raise BadInput("the law of this class has no reference, through which its twins put a signal out.")
         if request.law is None or request.from_rest:
             raise BadInput(NOT_HERE)
-        return LaneDesk(self._shared, lane, request.tilt, self._beside.target, self._judged)
+        own = None if request.law == self.rig.law_path else self._others[lane][request.law]
+        judge = own or self._judge
+        law = None if own is None else own.law
+        return LaneDesk(self._shared, lane, request.tilt, judge.target, judge.of, law=law)
 
-    def _judged(self, law: Law) -> tuple[str, Law]:
-        """Why a start with these gains would be refused, or an empty text; and the law as it runs."""
-        with self._lock:
-            why = self._beside.change(law)
-            fitted = self._beside.law
-        assert isinstance(fitted, Law)  # no other is changed
-        return why, fitted
+    def _known(self, lane: int, rig: BenchRig) -> BenchRig:
+        """The rig of a student by another description, once a run may begin under its law; it takes a while.
+
+        Raises
+        ------
+        BadInput
+            When its law differs from the others' by more than its gains.
+        RigStopped
+            When no run would begin under it.
+        """
+        if rig.law_path != self.rig.law_path:
+            judge = Judge(rig)
+            self._judge.check_alike(judge.law)
+            kept, used = self._others.get(lane, {}), self.stations[lane].rig.law_path
+            self._others[lane] = {path: each for path, each in kept.items() if path == used} | {rig.law_path: judge}
+        return replace(rig, model=rig.model.replace(name=self.students[lane].name))
 
     def _carry(self, order: RunOrder, *, watch: Callable[[RunState], str], desk: LaneDesk) -> RunEnd:
         """A run on the lane of a desk, as `run_in_process` has one in a process of its own."""
         if self._gone.is_set():
             raise BadInput(GONE)
         if desk.stopping:
-            return RunEnd(stopped=STOPPED_BY_HAND, held=self._beside.held, target=desk.target)
+            return RunEnd(stopped=STOPPED_BY_HAND, held=self._held, target=desk.target)
         order.log.touch()  # the next run is called otherwise, also while this one's log is not written
         with open(rows_of(order.log), "wb") as rows:
             run = LaneRun(desk=desk, watch=watch, rows=rows)
@@ -333,7 +348,7 @@ class Classroom:
         late = int(self._shared.late()[(end - 1) % ROWS] - answer["late"]) if end > first else 0
         return RunEnd(
             ticks=end - first, late=late, passed=min(late, int(self._shared.marks()[PASSED])), stopped=stopped,
-            faults=faults, about=self._about, held=self._beside.held, target=desk.target, rows=run.written,
+            faults=faults, about=self._about, held=self._held, target=desk.target, rows=run.written,
             dropped=run.dropped, events=tuple(run.changes), warning="" if self.priority == "FIFO" else "No FIFO.",
             seconds=(end - first) * self._about.period,
         )  # fmt: skip
@@ -348,7 +363,7 @@ class Classroom:
             case why if why == ENDED:
                 return "", NO_FAULT
             case why if why == LEANT:
-                away, lean = (abs(x) for x in (value - self._beside.target[-1], self._beside.duty.lean))
+                away, lean = (abs(x) for x in (value - self._judge.target[-1], self._judge.lean))
                 shown = [f"{math.degrees(x):.3g} degrees" if self._units[-1] == "rad" else f"{1e3 * x:.3g} mm"
                          for x in (away, lean)]  # fmt: skip
                 return (
@@ -356,7 +371,7 @@ class Classroom:
                     Fault.OVERTRAVEL,
                 )
             case why if why == TRAVELLED:
-                most = self._beside.held.travel[where]
+                most = self._held.travel[where]
                 return f"{name} is at {value:.4g}, beyond its travel of {most:.4g}.", Fault.OVERTRAVEL
             case _:
                 return f"The bench's server has not looked at it for {DEAF:g} s.", Fault.STOP

@@ -46,9 +46,10 @@ def routes(
     readable : callable
         Whether the files of a request's rig are for whoever sends it.
     fixed : str
-        Why rigs are known by their own descriptions alone, where that is so.
+        Why all rigs have one velocity filter, where that is so.
     """
     adopting = set[str]()  # rigs for which a law is on its way, which takes a process some seconds
+    designing = asyncio.Lock()  # one after the other: a class may want sixty, and processors are few
 
     async def described(request: Request) -> Response:
         own = fits.get(request.path_params["name"])
@@ -120,7 +121,7 @@ def routes(
 
     async def adopt(request: Request, own: Identifications) -> Response:
         key, memory, confirm = _model_named(await _body(request, LONGEST, f"a message of at most {LONGEST} bytes"))
-        if fixed:
+        if fixed and memory is not None:
             raise BadInput(fixed)
         name = request.path_params["name"]
         station = hubs[name].station
@@ -131,9 +132,11 @@ def routes(
             raise BadInput("its law is being designed for another model already; wait until that is there.")
         adopting.add(name)
         try:
-            rig = await asyncio.to_thread(_chosen, station, own, key, memory)
+            async with designing:
+                rig = await asyncio.to_thread(_chosen, station, own, key, memory)
             station.describe(request.headers.get(WHO, ""), rig)
-            await asyncio.to_thread(_keep, station, own, rig)
+            if not fixed:  # a class begins as it came
+                await asyncio.to_thread(_keep, station, own, rig)
         finally:
             adopting.discard(name)
         return JSONResponse({})
@@ -189,6 +192,7 @@ def _chosen(station: Station, own: Identifications, key: str | None, memory: flo
     rig = station.rig if key is None else own.described_by(key)
     if memory is not None:
         rig = rig.with_memory(memory, rig.law_path.parent if rig.fit else station.folder)
+    rig = station.known(rig)
     _ = rig.scene  # which is computed once, and by the server's loop if not here
     return rig
 
