@@ -56,6 +56,12 @@ def gyroscope(tilt=0.0):
     return table(names, [w + noise(0.01, 3 + i) for i, w in enumerate(turn)])
 
 
+def cosine(names, turned=0.0):
+    """As simulators log a pendulum whose zero is `turned` from hanging, with the speed beside it."""
+    angle = THETA + noise(1e-3, 6) - turned
+    return table((*names, "thdot"), [np.cos(angle), np.sin(angle), OMEGA])
+
+
 def log_of(text):
     return read_source(Source(file="log.txt", data=text.encode()))
 
@@ -69,6 +75,9 @@ LOGS = {
     "marker": marker(),
     "picture": marker(downwards=True),
     "captured": marker(names=("bob X [m]", "bob Z [m]")),
+    "cosine": cosine(("cos_th", "sin_th"), np.pi),
+    "functions": cosine(("Cos(theta)", "Sin(theta)")),
+    "words": cosine(("cosine", "sine"), 2.0),
     "gyroscope": gyroscope(),
     "tilted": gyroscope(0.6),
     "degrees": in_unit("deg/s", 180 / np.pi),
@@ -77,7 +86,7 @@ LOGS = {
 }
 
 
-PLACES = ("marker", "picture", "captured")
+PLACES = ("marker", "picture", "captured", "cosine", "functions", "words")
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -94,13 +103,15 @@ def test_the_angle_is_that_of_the_pendulum(name):
 
 
 def test_two_carts_and_two_angles_are_no_marker():
+    called = log_of(table(("cos_1", "sin_1"), [THETA, OMEGA]))
+    assert derived_angle(called, inspect(called), places=True) is None
     carts = log_of(table(("x", "y"), [0.1 * np.sin(3 * T), 0.1 * np.cos(2 * T)]))
     assert derived_angle(carts, inspect(carts), places=True) is None
     own = log_of(table(("theta [rad]", "Gyroscope z (rad/s)"), [THETA, OMEGA]))
     assert derived_angle(own, inspect(own), places=True) is None
 
 
-@pytest.mark.parametrize("name", ["captured", "tilted"])
+@pytest.mark.parametrize("name", ["captured", "tilted", "cosine"])
 def test_a_drafted_study_finds_the_length_unedited(name, tmp_path):
     log = tmp_path / "log.txt"
     log.write_text(LOGS[name], encoding="utf-8")

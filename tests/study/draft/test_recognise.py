@@ -94,7 +94,7 @@ FURUTA = "Two angles were taken for arm and pendulum of a Furuta pendulum."
         (ANGLES[:1], None, "pendulum", ""),
         (ANGLES[:1], DRIVE, "pendulum", "One angle was taken for a pendulum on a fixed pivot."),
         ([col("position", "deg", high=1800.0)], DRIVE, "torsional-1",
-         "'position' turns 5 times: taken for a disk; otherwise --plant pendulum."),
+         "'position' turns 5 times: taken for a disk."),
         ([col("position", "rad", high=6.0 * math.pi)], DRIVE, "pendulum",
          "One angle was taken for a pendulum on a fixed pivot."),
         ([col("position", "deg", high=1800.0)], None, "pendulum", ""),

@@ -1,4 +1,7 @@
-"""The angle of a pendulum whose log holds none: from the place of a marker on it, or from what a gyroscope turns."""
+"""The angle of a pendulum whose log holds none.
+
+From its cosine and sine, from the place of a marker on it, or from what a gyroscope turns.
+"""
 
 from __future__ import annotations
 
@@ -28,6 +31,7 @@ _MOST = 4000
 _ALIGNED = 0.999
 """Share of an axis in the turning from which on the others say nothing."""
 _TURNING = re.compile(r"rad|deg|°|rev|rpm|turn", re.IGNORECASE)
+_COSINE = re.compile(r"cos(?:ine)?(?![a-rt-z])", re.IGNORECASE)
 _AXIS = re.compile(r"(?<![a-z])[xyz](?![a-z])", re.IGNORECASE)
 
 
@@ -43,6 +47,8 @@ class DerivedAngle:
     def in_place(self, record: Record) -> Record:
         """The record with this column instead of those that it is computed from."""
         angle = expressions.evaluate(self.formula, record.signals, record.t)
+        if self.formula.startswith("atan2"):
+            angle = np.asarray(np.unwrap(angle), dtype=np.float64)
         left = {name: values for name, values in record.signals.items() if name not in self.of}
         units = {name: record.units[name] for name in left}
         return record.replace(signals={**left, NAME: angle}, units={**units, NAME: self.unit})
@@ -61,13 +67,30 @@ def derived_angle(record: Record, inspection: Inspection, *, places: bool) -> De
 
     `places`: whether columns of the log are places already, so that no speed has to be integrated.
     """
-    if NAME in record.signals or any(c.drive for c in inspection.columns) or record.inputs:
+    if NAME in record.signals:
         return None
     moves = [c for c in inspection.columns if not c.constant]
+    if (angle := _by_its_cosine(record, moves)) is not None:
+        return angle
+    if any(c.drive for c in inspection.columns) or record.inputs:
+        return None
     for pair in combinations([c for c in moves if _AXIS.search(c.name)], 2):
         if _of_one_thing(pair) and (angle := _on_an_arc(record, pair[0].name, pair[1].name)) is not None:
             return angle
     return None if places else _turned(record, moves)
+
+
+def _by_its_cosine(record: Record, moves: Sequence[Column]) -> DerivedAngle | None:
+    """The angle whose cosine and sine two columns are called, and are."""
+    names = {c.name.lower(): c.name for c in moves}
+    for cosine in (c.name for c in moves if _COSINE.search(c.name)):
+        sine = names.get(_COSINE.sub("sin", cosine.lower()), names.get(_COSINE.sub("sine", cosine.lower()), ""))
+        if sine and float(np.abs(np.hypot(record[cosine], record[sine]) - 1).max()) < ROUND:
+            return DerivedAngle(
+                formula=f"atan2(`{sine}`, `{cosine}`)", unit="rad", of=(cosine, sine),
+                doubt=f"'{cosine}' and '{sine}' are cosine and sine of an angle, which is computed.",
+            )  # fmt: skip
+    return None
 
 
 def _of_one_thing(columns: Sequence[Column]) -> bool:

@@ -334,7 +334,7 @@ def plant_of(places: list[Column], drive: Column | None) -> tuple[str, str]:
     one = angles[0]
     turns = ANGLES[one.guess] * (one.high - one.low) / (2 * math.pi)
     if turns > SPINS:
-        return "torsional-1", f"'{one.name}' turns {turns:.0f} times: taken for a disk; otherwise --plant pendulum."
+        return "torsional-1", f"'{one.name}' turns {turns:.0f} times: taken for a disk."
     return "pendulum", "One angle was taken for a pendulum on a fixed pivot."
 
 
