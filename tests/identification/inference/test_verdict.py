@@ -16,11 +16,12 @@ from upright.identification.inference.loop import standing
 from upright.identification.inference.verdict import judge, trusted
 from upright.identification.inference.verdict.evidence import Evidence
 from upright.identification.model.fit import Assumption, Estimate, Judgement, RunScore
-from upright.identification.model.grey_box import GreyBox
+from upright.identification.model.grey_box import GreyBox, Parameter
 from upright.identification.model.runs import Run
 from upright.identification.problem.residuals import formulate
 from upright.identification.search.descent import descend_progressively
 from upright.physics import Furuta, Pendulum
+from upright.simulation import simulate
 
 
 def test_a_reversed_sensor_is_named() -> None:
@@ -161,14 +162,64 @@ def test_no_answer_is_better_than_the_prediction_it_rests_on() -> None:
     assert "does not predict" in answers[1].reasons[0]
 
 
-def test_friction_at_zero_is_said_to_have_no_evidence() -> None:
+NOTHING = (
+    "these data give no evidence for it (at most {}), and the other intervals hold what so much of it would change."
+)
+
+
+def test_friction_at_zero_takes_nothing_from_the_other_numbers() -> None:
+    """Their intervals hold what it would change, were it as large as its own allows: as of a term that was left out."""
     none = Estimate(value=0.0, stderr=0.0, interval=(0.0, 3e-4), unit="N m", status="at bound")
     firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="kg m^2")
-    told = _judged({"a": _score("fit", 99.0, None)}, {"b_2c": none, "J_p": firm})[1]
-    assert told.answer == "in part"
-    assert told.reasons == (
-        "b_2c reached its lower limit, 0: these data give no evidence for it (at most 0.0003 N m).",
+    tested = {"a": _score("fit", 99.0, None), "b": _score("predict", 99.0, None)}
+    told = _judged(tested, {"b_2c": none, "J_p": firm})[1]
+    assert (told.answer, told.headline) == ("yes", "All numbers can be used: J_p. It is known to 5 % or better.")
+    assert told.reasons == (f"b_2c reached its lower limit, 0: {NOTHING.format('0.0003 N m')}",)
+    vague = replace(firm, interval=(1e-3, 5e-3), status="poorly determined")
+    assert _judged(tested, {"b_2c": none, "J_p": vague, "b_2": firm})[1].answer == "in part"
+
+
+@pytest.mark.parametrize("name", ["J_p", "l_cg"])
+def test_an_inertia_or_a_length_of_zero_is_no_small_matter(name: str) -> None:
+    none = Estimate(value=0.0, stderr=0.0, interval=(0.0, 3e-4), unit="kg m^2", status="at bound")
+    firm = Estimate(value=2e-3, stderr=1e-5, interval=(1.9e-3, 2.1e-3), unit="N m s/rad")
+    tested = {"a": _score("fit", 99.0, None), "b": _score("predict", 99.0, None)}
+    assert _judged(tested, {name: none, "b_2": firm})[1].answer == "in part"
+
+
+def late(seed: int, **delay: float) -> tuple[Estimate, Judgement]:
+    """The dead time of a Furuta pendulum's drive that has none, and what is said of its numbers."""
+    dt, n = 4e-3, 1001
+    t = np.arange(n) * dt
+    runs: list[Run] = []
+    for label, role, slow in (("one", "fit", 0.7), ("two", "predict", 0.5)):
+        u = (0.04 * np.sin(2 * np.pi * slow * t) + 0.03 * np.sin(2 * np.pi * 1.9 * t))[:, None]
+        x = simulate(Furuta(**FURUTA), {}, [0.0, 0.0, 0.5, 0.0], u, dt, samples=n, substeps=4)
+        run = Run(label=label, role=role, t=t, u=u, y=x[:, [0, 2], 0], measured=("psi", "theta"))  # type: ignore[arg-type]
+        runs.append(noisy(run, 1e-3, seed=seed))
+    asked = Parameter(
+        **{"name": "actuator.delay", "value": 4e-3, "unit": "s", "estimate": True, "lower": 0.0, "upper": 0.2} | delay
     )
+    known = rig(Furuta, FURUTA, {"J_d": 0.006, "b_1": 6e-3, "b_1c": 2e-3})
+    fit = identify(replace(known, substeps=4, parameters={**known.parameters, asked.name: asked}), runs)
+    for name in ("J_d", "b_1", "b_1c"):
+        assert fit.estimates[name].value == pytest.approx(FURUTA[name], rel=0.03), name
+    return fit.estimates[asked.name], fit.answers[1]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 4, 5])
+def test_a_dead_time_that_is_not_there_leaves_all_numbers_usable(seed: int) -> None:
+    """Whether its estimate ends at zero or, by noise, a hundredth of a millisecond above."""
+    e, told = late(seed)
+    assert 0 == e.interval[0] <= e.value < e.interval[1] < 1e-3
+    assert told.answer == "yes"
+    assert any("actuator.delay" in r and "no evidence" in r for r in told.reasons)
+
+
+def test_a_dead_time_that_its_limit_bounds_and_no_data_do_may_matter() -> None:
+    e, told = late(5, value=1e-5, upper=2e-5)
+    assert e.interval[1] == 2e-5
+    assert told.answer == "in part"
 
 
 @pytest.mark.parametrize(

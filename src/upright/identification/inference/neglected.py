@@ -228,7 +228,8 @@ def together_late(best: Optimum) -> tuple[str, Estimate] | None:
     slope = np.array([there.values[i] if both.unknowns[i].log else 1.0 for i in places])
     total = float(there.values[places].sum())
     error = math.sqrt(slope @ there.covariance[np.ix_(places, places)] @ slope)
-    return name, Estimate.within(total, error, best.quantile * error, "s")
+    half = best.quantile * error
+    return name, Estimate(value=total, stderr=error, interval=(max(0.0, total - half), total + half), unit="s")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from upright.identification.inference.assumptions import resting
 from upright.identification.inference.intervals import VAGUE
+from upright.identification.inference.neglected import DELAY, LAG
 from upright.identification.inference.verdict.evidence import USABLE, Evidence
 from upright.identification.model.fit import Estimate, Judgement
 from upright.identification.model.grey_box import GreyBox
@@ -17,6 +18,9 @@ VANISHED = 1e-6
 
 ESSENTIAL = ("J_", "m_", "k_", "l_", "actuator.gain")
 """Numbers without which a model is none: inertias, stiffnesses, lengths, the drive; friction is often vague."""
+
+FELT = 0.1
+"""Phase [rad], 6 degrees, that a drive may cost a loop by acting late before it matters."""
 
 IDLE = ("known", "assumed", "left out", "nuisance")
 """Statuses of numbers that nobody asked, or that only describe the noise."""
@@ -35,6 +39,8 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
     estimated = {n: e for n, e in evidence.estimates.items() if e.status not in IDLE}
     sure = [n for n, e in estimated.items() if e.status.startswith(DETERMINED)]
     reasons: list[str] = [*evidence.unseen, *filter(None, [evidence.alike])]
+    notes: list[str] = []
+    negligible: list[str] = []
     no = bool(evidence.unseen)
     if estimated and evidence.nothing:
         no = True
@@ -61,10 +67,13 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
                 f"{n} reached its {'lower' if e.value <= limit[0] else 'upper'} limit, {_shown(e.value, e)}: the data "
                 f"would push {n} past a bound that was set for it. Widen it, or give the value as known."
             )
-        elif e.status == "at bound":
-            reasons.append(
-                f"{n} reached its lower limit, 0: these data give no evidence for it (at most {_shown(high, e)})."
-            )
+        elif (absent := _negligible(evidence, n, e)) or e.status == "at bound":
+            at = f"{n} reached its lower limit, 0" if e.value == 0 else f"{n} is {_shown(e.value, e)} and may be 0"
+            remark = f"{at}: these data give no evidence for it (at most {_shown(high, e)})"
+            if absent:
+                negligible.append(n)
+                remark += ", and the other intervals hold what so much of it would change"
+            (notes if absent else reasons).append(f"{remark}.")
         elif e.status == "poorly determined" and low > 0 and high > VAGUE * low:
             no = no or n.startswith(ESSENTIAL)
             reasons.append(f"{n} lies anywhere from {low:.2g} to {_shown(high, e)}: it is not determined.")
@@ -76,7 +85,8 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
             )
         elif e.status == "poorly determined" and not evidence.nothing:
             reasons.append(f"{n} is known poorly, {low:.2g} to {_shown(high, e)}.")
-    open_ = {n for n, e in estimated.items() if not e.status.startswith("well") and not e.status.startswith("rests")}
+    firm = ("well", "rests")
+    open_ = {n for n, e in estimated.items() if n not in negligible and not e.status.startswith(firm)}
     reasons += [tie.sentence for tie in evidence.ties if {tie.first, tie.second} & open_]
     for a in evidence.assumptions:
         moved = resting(a)
@@ -123,9 +133,26 @@ def usable_numbers(evidence: Evidence, *, confirmed: bool, untested: bool) -> Ju
             "They rest on no run that was held out: a term that the model lacks would be in one of them, unnoticed."
         )
     advice = ""
-    if any(e.status in ("poorly determined", "unseen") for e in estimated.values()):
+    if any(e.status in ("poorly determined", "unseen") for n, e in estimated.items() if n not in negligible):
         advice = "Measure one of the others on the bench and give it as known, or add a run that moves it more."
-    return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=tuple(reasons))
+    return Judgement(question=USABLE, answer=answer, headline=headline, advice=advice, reasons=(*reasons, *notes))
+
+
+def _negligible(evidence: Evidence, name: str, e: Estimate) -> bool:
+    """Whether a term that may be absent is none that matters, were it as large as its interval allows.
+
+    The intervals of the others are widened by what it would change. That the data bound it says that it is not felt in
+    motions like theirs. A drive that acts late is felt by a loop besides, by the phase that this costs at the rate of
+    what the rig does fastest.
+    """
+    low, high = e.given or e.interval
+    lower, upper = evidence.rig.bounds(name) if name in evidence.rig.parameters else (-math.inf, math.inf)
+    late, none = name in (DELAY, LAG), e.status == "at bound" and e.value == 0
+    absent = none or (late and e.status == "poorly determined" and low <= 0)
+    if not absent or lower != 0 or not high < upper or name.startswith(ESSENTIAL):
+        return False
+    falls = evidence.standing.growth.value if evidence.standing else 0.0
+    return not late or high * max(falls, 2 * math.pi / evidence.period) <= FELT
 
 
 def _missing(evidence: Evidence, names: Sequence[str]) -> str:
