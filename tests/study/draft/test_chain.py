@@ -118,6 +118,15 @@ def test_a_body_that_creeps_beside_one_that_swings_is_held(drafted):
     assert isinstance(study.runs[0].held["x_2"], np.ndarray)
 
 
+def test_the_spring_between_two_bodies_that_are_held_needs_no_guess(drafted):
+    """As where the third cart alone is let go; such a draft was refused, since this spring had no number."""
+    x = np.where(T > ON, swing(3000.0, 0.4, 400.0, T - ON), 3000.0)
+    _, study = drafted(t=T, enc1=np.round(3 * np.sin(T)), enc2=np.round(4 * np.sin(T)), enc3=np.round(x))
+    assert list(study.runs[0].held) == ["x_1", "x_2"]
+    assert "k_23" in study.model.estimated
+    assert "k_12" not in study.model.estimated
+
+
 def test_a_body_that_does_not_move_is_locked(drafted):
     x = np.round(0.01 * METRE * np.where(T >= ON, 1 - np.exp(-(T - ON)) * np.cos(12 * (T - ON)), 0))
     _, study = drafted(t=T, target_value=VOLTS, enc1=x, enc2=np.full_like(x, 7.0))

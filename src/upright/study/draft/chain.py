@@ -170,6 +170,8 @@ def _parameters(log: ChainLog, plant: type[Plant], start: ChainStarts) -> TomlTa
             scaled = True
             why = "MEASURE: a free swing sees only ratios"
             table.key(name, assumed(start.numbers[name], what.unit), f"{what.meaning}; {why}")
+        elif name.startswith("k_") and len(name) == 4 and all(stuck[int(end) - 1] for end in name[2:]):
+            table.key(name, assumed(1, what.unit), f"{what.meaning}; both held, so it does not matter")
         elif carts and name == "k_12" and driven and len(stuck) == 2 and stuck[1]:
             why = "MEASURE: with body 2 held, only k_1 + k_12 is seen"
             table.key(name, assumed(start.numbers["k_1"] / 2, what.unit), f"{what.meaning}; {why}")
