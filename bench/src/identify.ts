@@ -206,7 +206,9 @@ export class Identify {
     byId("fit-going").hidden = !now;
     byId("fit-live").hidden = !now || this.picture?.id !== now.id;
     byId("weigh-live").hidden = !this.weighed || !!now || !this.weighing.there;
+    const unseen = byId("record-live").hidden;
     byId("record-live").hidden = !this.recorded || !!now || !byId("weigh-live").hidden;
+    if (unseen && !byId("record-live").hidden) this.recording.draw(); // what is hidden has no size to be drawn in
     byId("fit-result").hidden = byId("fit-curves").hidden = !this.facts || !byId("fit-live").hidden || !byId("record-live").hidden || !byId("weigh-live").hidden;
     if (byId("fit-result").hidden) byId<HTMLSelectElement>("fit-list").value = ""; // so that the last one can be chosen, too
     if (now) {

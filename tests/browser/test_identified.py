@@ -237,6 +237,10 @@ def test_a_sweep_a_step_and_a_weighing_are_drawn_as_they_come_and_stop_as_every_
         assert page.locator("#record-pictures canvas").count() == 2
         page.click("#end")
         one.reads("#record-says", "kept as a run")
+        page.reload()  # as after another model came into use; what was recorded is drawn again
+        one.reads("#record-reading", r"measured swing\d\.\d+ ± ")
+        inked = "c.width && c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v)"
+        until(page, f"[...document.querySelectorAll('#record-pictures canvas')].every((c) => {inked})")
         violations = axe.Axe().run(page).response["violations"]
         page.click("#weigh")
         one.reads("#weigh-says", "A line explains all 5 loadings")
