@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.browser.runs import SOON, hardware, twin
-from upright.browser.identify.recording import Recording, recording_plan
+from upright.browser.identify.recording import Recording, Sparing, recording_plan
 from upright.browser.messages import ONE_STEP, SWEEP
 from upright.errors import BadInput
 from upright.experiments.frequency_1b.one_by_one import stepped_sines
@@ -138,6 +138,26 @@ def test_of_a_step_everything_is_drawn_beside_what_the_model_would_show_and_its_
     assert low == drawn["modes"]["held"][0]
     assert 0.95 * low < drawn["reading"]["omega"] < 1.02 * high
     assert list(tmp_path.glob("*.frequency.csv")) == []
+
+
+def test_what_is_costly_is_done_by_one_at_a_time_and_by_whoever_must_have_it():
+    sparing, sure, go = Sparing(), threading.Event(), threading.Event()
+
+    def working():
+        with sparing.turn(wait=True) as mine:
+            assert mine
+            sure.set()
+            assert go.wait(SOON)
+
+    first = threading.Thread(target=working)
+    first.start()
+    assert sure.wait(SOON)
+    with sparing.turn(wait=False) as mine:
+        assert not mine
+    go.set()
+    with sparing.turn(wait=True) as mine:
+        assert mine
+    first.join(SOON)
 
 
 def test_a_rig_that_can_really_move_is_recorded_by_somebody_beside_it(rig):

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
+import time
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -47,6 +49,26 @@ class Samples(Protocol):
     def since(self, number: int) -> tuple[int, NDArray[np.void]]: ...  # noqa: D102
 
 
+class Sparing:
+    """Lets what is costly be done now and then: by one at a time, and for a quarter of the time."""
+
+    def __init__(self) -> None:
+        self._lock, self._next = threading.Lock(), 0.0
+
+    @contextmanager
+    def turn(self, *, wait: bool) -> Generator[bool]:
+        """Whether it may be done now; whoever waits may, sooner or later."""
+        mine = self._lock.acquire(blocking=wait)
+        began = time.monotonic()
+        try:
+            yield mine and (wait or began >= self._next)
+        finally:
+            if mine:
+                now = time.monotonic()
+                self._next = max(self._next, now + 3.0 * (now - began))
+                self._lock.release()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordingPlan:
     """What is put out to record a sweep or a step.
@@ -61,6 +83,8 @@ class RecordingPlan:
         Equilibrium at which it rests.
     request : RunRequest
         The run that it is.
+    sparing : Sparing
+        Shared by all who record by this plan.
     """
 
     kind: str
@@ -68,6 +92,7 @@ class RecordingPlan:
     at: str
     signal: SteppedSines | StepSignal
     request: RunRequest
+    sparing: Sparing = field(default_factory=Sparing)
 
 
 def recording_plan(rig: BenchRig, kind: str) -> RecordingPlan:
@@ -105,7 +130,7 @@ class Recording:
 
     def __init__(self, plan: RecordingPlan) -> None:
         self.kind, self._rig, self._at, self._plan = plan.kind, plan.rig, plan.at, plan.signal
-        self.request = plan.request
+        self.request, self._sparing = plan.request, plan.sparing
         size = self._plan.samples.size
         self._y, self._u = np.full((size, len(plan.rig.per_unit)), np.nan), np.full(size, np.nan)
         self._line: Facts = {}
@@ -197,6 +222,7 @@ class Recording:
         while not over:
             over = self._over.wait(OFTEN)
             self._take(desk)
+            self._evaluate(last=over)
 
     def _take(self, desk: Samples) -> None:
         self._next, rows = desk.since(self._next)
@@ -210,14 +236,20 @@ class Recording:
         if at[0] == 0:
             self._y[0] = self._y[1]  # at rest
         came = int(at[-1]) + 1
-        if isinstance(self._plan, SteppedSines):
-            self._measure(self._plan, came)
-        else:
-            decayed = reading(self._plan, self._rig, self._y[:came]) if np.isfinite(self._y[:came]).all() else None
-            with self._lock:
-                self._reading = decayed
         with self._lock:
             self._came, self._lost = came, int(np.isnan(self._u[:came]).sum())
+
+    def _evaluate(self, *, last: bool) -> None:
+        came = self._came
+        if isinstance(self._plan, SteppedSines):
+            self._measure(self._plan, came)
+        elif came:
+            with self._sparing.turn(wait=last) as mine:  # of a class, sixty would keep its server from looking at twins
+                if mine:
+                    whole = np.isfinite(self._y[:came]).all()
+                    decayed = reading(self._plan, self._rig, self._y[:came]) if whole else None
+                    with self._lock:
+                        self._reading = decayed
 
     def _measure(self, plan: SteppedSines, came: int) -> None:
         while self._tried < len(plan.windows) and plan.windows[self._tried][1] <= came:
