@@ -43,7 +43,7 @@ from upright.browser.rig import HARDWARE, NO_LAW, BenchRig
 from upright.browser.runs import in_own_process, write_report
 from upright.browser.station import Station
 from upright.errors import BadInput, UprightError
-from upright.laws import Law, as_values
+from upright.laws import Law
 from upright.logs.replay import other_gains
 from upright.realtime import desk as usual
 from upright.realtime.interrupts import ignoring
@@ -381,7 +381,7 @@ class Classroom:
         assert end.held is not None  # every run of a lane has its limits
         law = for_rig(run.law, self._about, end.held, end.target)
         assert isinstance(law, Law)  # as every desk has seen to
-        kept = replace(run, law=NO_LAW, order=replace(run.order, law=as_values(law)))
+        kept = replace(run, law=NO_LAW, order=replace(run.order, law={}))  # neither log nor report looks there
         of_log = (kept, end, started, self._units, law)
         with self._logging:
             if self._closing.is_set():  # no process is begun any more

@@ -241,15 +241,16 @@ class Recording:
 
     def _evaluate(self, *, last: bool) -> None:
         came = self._came
-        if isinstance(self._plan, SteppedSines):
-            self._measure(self._plan, came)
-        elif came:
-            with self._sparing.turn(wait=last) as mine:  # of a class, sixty would keep its server from looking at twins
-                if mine:
-                    whole = np.isfinite(self._y[:came]).all()
-                    decayed = reading(self._plan, self._rig, self._y[:came]) if whole else None
-                    with self._lock:
-                        self._reading = decayed
+        with self._sparing.turn(wait=last) as mine:  # of a class, sixty would keep its server from looking at twins
+            if not mine or not came:
+                return
+            if isinstance(self._plan, SteppedSines):
+                self._measure(self._plan, came)
+                return
+            whole = np.isfinite(self._y[:came]).all()
+            decayed = reading(self._plan, self._rig, self._y[:came]) if whole else None
+            with self._lock:
+                self._reading = decayed
 
     def _measure(self, plan: SteppedSines, came: int) -> None:
         while self._tried < len(plan.windows) and plan.windows[self._tried][1] <= came:
