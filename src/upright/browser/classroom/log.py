@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from upright.browser.runs import list_run
+from upright.errors import UprightError
 from upright.laws import Law
 from upright.logs.layout import RunFile
 from upright.realtime.session import RunEnd, log_header
@@ -26,15 +30,33 @@ def row_of(coordinates: int) -> np.dtype[np.void]:
     return np.dtype([("tick", "<i8"), ("counts", "<i8", (coordinates,)), ("command", "<f8"), ("reference", "<f8")])
 
 
-def write_lane_log(run: PreparedRun, end: RunEnd, started: float, units: tuple[str, ...], law: Law) -> str:
-    """Write the log of a run and list it, before there is a report."""
-    path = run.order.log
-    if end.about is None or not end.ticks:
-        path.unlink(missing_ok=True)
-    else:
-        _write_log(run, end, started, units, law)
-        list_run(run, started, end.seconds)
-    rows_of(path).unlink(missing_ok=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LaneLog:
+    """What makes the log of a run, whose rows are there."""
+
+    run: PreparedRun
+    end: RunEnd
+    started: float
+    units: tuple[str, ...]
+    law: Law
+
+
+def write_lane_logs(logs: Sequence[LaneLog]) -> str:
+    """Write logs and list their runs, before there are reports; of each what went wrong, or an empty text, as JSON."""
+    return json.dumps([_written(log) for log in logs])
+
+
+def _written(log: LaneLog) -> str:
+    path = log.run.order.log
+    try:
+        if log.end.about is None or not log.end.ticks:
+            path.unlink(missing_ok=True)
+        else:
+            _write_log(log.run, log.end, log.started, log.units, log.law)
+            list_run(log.run, log.started, log.end.seconds)
+        rows_of(path).unlink(missing_ok=True)
+    except (OSError, UprightError) as error:  # the others' are written all the same
+        return f"its log was not written: {error}"
     return ""
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -18,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.browser.classroom.judge import Judge
-from upright.browser.classroom.log import NO_REPORT, row_of, rows_of, write_lane_log
+from upright.browser.classroom.log import NO_REPORT, LaneLog, row_of, rows_of, write_lane_logs
 from upright.browser.classroom.memory import (
     BY_HAND,
     CLOSE,
@@ -240,6 +242,7 @@ class Classroom:
         self._runs: dict[int, LaneRun] = {}
         self.pid = 0
         self._logging, self._writing = threading.Lock(), threading.Lock()
+        self._unwritten, self._written = deque[LaneLog](), dict[int, str]()
         self._closing, self._gone = threading.Event(), threading.Event()
         self._write = report or self._report
         self.stations = tuple(self._station(lane, student, folder) for lane, student in enumerate(students))
@@ -382,16 +385,28 @@ class Classroom:
         law = for_rig(run.law, self._about, end.held, end.target)
         assert isinstance(law, Law)  # as every desk has seen to
         kept = replace(run, law=NO_LAW, order=replace(run.order, law={}))  # neither log nor report looks there
-        of_log = (kept, end, started, self._units, law)
+        log = LaneLog(run=kept, end=end, started=started, units=self._units, law=law)
+        self._unwritten.append(log)
         with self._logging:
-            if self._closing.is_set():  # no process is begun any more
-                write_lane_log(*of_log)
-            else:
-                in_own_process(write_lane_log, *of_log)
+            if id(log) not in self._written:  # else it was written with another's
+                self._write_logs()
+        if why := self._written.pop(id(log)):
+            raise UprightError(why)
         with self._writing:
             if self._closing.is_set():
                 raise UprightError(NO_REPORT)
             return in_own_process(write_report, kept, end, started)
+
+    def _write_logs(self) -> None:
+        """All that wait: a process takes a second to begin, and STOP ALL ends sixty runs at once."""
+        logs = [self._unwritten.popleft() for _ in range(len(self._unwritten))]
+        try:
+            # when all is closed no process is begun any more
+            text = write_lane_logs(logs) if self._closing.is_set() else in_own_process(write_lane_logs, logs)
+            outcome: list[str] = json.loads(text)
+        except UprightError as error:
+            outcome = [str(error)] * len(logs)
+        self._written.update(zip(map(id, logs), outcome, strict=True))
 
     def _keep(self) -> None:
         process = get_context("spawn").Process(
