@@ -82,6 +82,17 @@ def test_an_angle_that_begins_again_after_a_turn_goes_on(unit, turn, lowest):
     assert times == int((np.diff((angle - lowest * turn) // turn) != 0).sum())
 
 
+def test_an_angle_that_is_balanced_where_it_begins_again_goes_on():
+    """An encoder of 2000 counts a turn, and columns without a unit that are called like angles."""
+    tilt = np.round(300 * 0.04 * np.sin(9 * T)) * 0.18
+    logged = (tilt + 360) % 360 - 180
+    rows = "\n".join(f"{t:.3f},{a:.2f},{np.radians(a):.5f},{a:.2f}" for t, a in zip(T, logged, strict=True))
+    record = read_source(Source(file="log.csv", data=f"time,pendulum [deg],theta,u\n{rows}\n".encode()))
+    np.testing.assert_allclose(record["pendulum [deg]"] - record["pendulum [deg]"][0], tilt - tilt[0], atol=0.011)
+    np.testing.assert_allclose(record["theta"] - record["theta"][0], np.radians(tilt - tilt[0]), atol=2e-5)
+    np.testing.assert_allclose(record["u"], logged, atol=0.011)  # a command may bang
+
+
 @pytest.mark.parametrize(
     "angle",
     [

@@ -127,7 +127,7 @@ class Inspection:
 
 def inspect_record(record: Record) -> Inspection:
     """Inspection of a record."""
-    columns = tuple(_column(record, name) for name in record.names)
+    columns = tuple(inspect_column(record, name) for name in record.names)
     moving = [
         record[c.name]
         for c in columns
@@ -169,7 +169,8 @@ def time_base(record: Record) -> TimeBase:
     )
 
 
-def _column(record: Record, name: str) -> Column:
+def inspect_column(record: Record, name: str) -> Column:
+    """Inspection of one column."""
     x = record.signals[name]
     low, high = float(x.min()), float(x.max())
     step = resolution_of(x)

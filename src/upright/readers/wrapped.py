@@ -55,17 +55,26 @@ def turned_on(values: Array, unit: str) -> tuple[Array, int]:
     low, high = float(values.min()), float(values.max())
     slack = SLACK * whole
     inside = (low >= -whole / 2 - slack and high <= whole / 2 + slack) or (low >= -slack and high <= whole + slack)
-    return _without_jumps(values, whole) if inside and high - low >= FULL * whole else (values, 0)
+    if not inside or high - low < FULL * whole:
+        return values, 0
+    return _without_jumps(values, whole, fewest=FEWEST_PLACES)
 
 
 SLACK = 1e-3
 """Of a turn, what digits and noise may add to it."""
+FEWEST_PLACES = 4
+"""Different readings of an angle: an encoder whose zero is upright has few while a loop balances."""
 
 
-def _without_jumps(values: Array, whole: float) -> tuple[Array, int]:
+def jumps_as_an_angle(values: Array) -> bool:
+    """Whether readings (N,) go at once through most of what they go through at all."""
+    return float(np.abs(np.diff(values)).max(initial=0.0)) > (1 - SWIFT) * float(np.ptp(values)) > 0
+
+
+def _without_jumps(values: Array, whole: float, *, fewest: int = FEWEST) -> tuple[Array, int]:
     steps = np.abs(np.diff(values))
     jumps = steps > (1 - SWIFT) * whole
-    if not jumps.any() or (steps[~jumps] > SWIFT * whole).any() or np.unique(values).size < FEWEST:
+    if not jumps.any() or (steps[~jumps] > SWIFT * whole).any() or np.unique(values).size < fewest:
         return values, 0
     turns = np.concatenate([[0.0], np.cumsum(-np.sign(np.diff(values)) * jumps)])
     return values + whole * turns, int(jumps.sum())

@@ -256,13 +256,15 @@ def test_a_balanced_pendulum_is_sized_by_the_rate_at_which_it_falls():
 
 def test_numbers_of_a_balanced_pendulum_follow_from_its_inertia():
     cart = starts_upright(UPRIGHT, "cart-pendulum")
+    # of the hinge, two thousandths of m l^2 times the rate, and a thousandth of the pendulum's weight on its lever
+    hinge = {"b_2": 0.002 * 7.0 * 0.1 * LEVER**2, "b_2c": 0.001 * 9.81 * 0.1 * LEVER}
     assert {n: v for n, (v, _) in cart.assumed.items()} == {"m_p": 0.1, "J_p": 0.0, "m_c": 0.5}
-    assert cart.guesses == pytest.approx({"l_cg": LEVER, "b_1": 1.0, "b_1c": 0.12})
+    assert cart.guesses == pytest.approx({"l_cg": LEVER, "b_1": 1.0, "b_1c": 0.12} | hinge)
     assert cart.uncertain == {}
     arm, inertia = starts_upright(UPRIGHT, "furuta"), 0.2 * (0.8 * LEVER) ** 2
     assert {n: v for n, (v, _) in arm.assumed.items()} == {"m_p": 0.1, "J_p": 0.0}
     assert arm.guesses == pytest.approx(
-        {"l_cg": LEVER, "b_1": 2 * inertia, "b_1c": 0.24 * inertia, "J_d": inertia / 2, "k_psi": 2 * inertia}
+        {"l_cg": LEVER, "b_1": 2 * inertia, "b_1c": 0.24 * inertia, "J_d": inertia / 2, "k_psi": 2 * inertia} | hinge
     )
     assert arm.uncertain == {"r": (pytest.approx(0.8 * LEVER), "30 %")}
 

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from upright.errors import BadInput
 from upright.identification.model.grey_box import GreyBox
+from upright.identification.model.runs import Run
 from upright.identification.search.starts import Sample, regress, samples_of
 from upright.records import Record
 from upright.study.load import load_study
@@ -41,6 +44,8 @@ pendulum, its arm's length estimated, explains 96 %.
 def explained(record: Record, drafts: Mapping[str, str], log: str) -> dict[str, float]:
     """Share of the variance of the accelerations that each plant explains, 0 to 1, the best first.
 
+    Of a coordinate whose motion a draft prescribes, although a command drives the rig, it explains nothing.
+
     Parameters
     ----------
     drafts : mapping of str to str
@@ -61,8 +66,15 @@ def explained(record: Record, drafts: Mapping[str, str], log: str) -> dict[str, 
             samples = samples_of(study.model, study.runs, most=MOST, flips=dict(zip(others, signs, strict=True)))
             left = min(left, regress(sprung(study.model, samples[0]), samples).unexplained) if samples else left
         if math.isfinite(left):
-            shares[plant] = max(0.0, 1 - left)
+            shares[plant] = max(0.0, 1 - left) * _part_left_free(study.runs)
     return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+
+def _part_left_free(runs: Sequence[Run]) -> float:
+    """Share of the coordinates of driven runs whose motion is not prescribed, of those that move."""
+    free = {c for run in runs for c in run.measured if c not in run.held}
+    moved = {c for run in runs if run.u.any() for c, motion in run.held.items() if isinstance(motion, np.ndarray)}
+    return len(free) / len(free | moved)
 
 
 def sprung(rig: GreyBox, sample: Sample) -> GreyBox:

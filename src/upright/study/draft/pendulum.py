@@ -177,6 +177,8 @@ def starts_upright(balanced: Balanced, plant: str) -> PendulumStarts:
     assumed = {"m_p": (MASS, SCALE), "J_p": (0.0, SIMPLE)}
     inertia = balanced.inertia(plant)
     guesses = {"l_cg": balanced.length, "b_1": 2 * inertia, "b_1c": 0.02 * balanced.gain(plant)}
+    # near upright gravity pulls by little, so that a hinge that rubs by a hundredth of it is felt
+    guesses |= {"b_2": 0.002 * balanced.rate * MASS * balanced.length**2, "b_2c": 0.001 * G * MASS * balanced.length}
     if plant == "cart-pendulum":
         return PendulumStarts(assumed=assumed | {"m_c": (inertia, "MEASURE")}, guesses=guesses)
     return PendulumStarts(assumed=assumed, guesses=guesses | {"J_d": inertia / 2, "k_psi": 2 * inertia},
