@@ -2,15 +2,16 @@
 
 Over a time at whose ends a linear rig stands still, the Fourier sums of output and command stand in the ratio of its
 response, whatever lies between (Pintelon and Schoukens 2012, section 2.6: the difference of the states at both ends is
-all that leaks). An output that comes to rest elsewhere is summed on to infinity as the constant that it is then. What
-still moves at either end, and what the command's and the outputs' noise adds, is the error that is stated.
+all that leaks). What still moves at the end of a rest is continued as it swung and decayed within the rests
+(`free_motion`): the sum goes on with it after the last, and what came from before the first is taken away. How unsure
+that is, and what the noise of outputs and command adds, is the error that is stated.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from upright.identification.frequency.detection import PER_PERIOD, Tone, detect
+from upright.identification.frequency.free_motion import FreeMotion, free_motion, motionless
 from upright.signals.steps import smallest_step
 
 Array = NDArray[np.float64]
@@ -33,14 +35,10 @@ SURE = 5.0
 """Standard deviations of that noise within which a command rests."""
 SHORTEST, SHARE = 12, 0.05
 """Samples of a rest at least, and, between two sines, its share of the longer: less is a sine that passes by."""
-PARTS = 6
-"""Parts of a rest whose sums say how fast a swing dies away."""
-LINGERS = 0.98
-"""Largest share of a swing that is taken to remain after one of them."""
-ABOVE = np.array([1.0, 1.5, 2.0])
-"""Frequencies at which noise is looked at, over that of a sine."""
+FLOOR = 1e-6
+"""Share of a response that is never sure: frequency and rates are sought to about that."""
 UNSETTLED = 0.02
-"""Share of a line that what still swings may be before the response says so."""
+"""Share of a line that what is continued after a rest may be before the response says so."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,97 +119,115 @@ def _sine(t: Array, u: Array) -> tuple[float, float]:
     return 2 * math.pi * float(top.x) / span, 1 - float(top.fun)
 
 
-def rested_answer(t: Array, y: Array, u: Array, sine: RestedSine, quanta: Array) -> tuple[Tone, Tone, bool]:
+@dataclass(frozen=True, kw_only=True)
+class RestedLog:
+    """A log whose command rests now and then.
+
+    Attributes
+    ----------
+    t, u : (N,) arrays
+        Time [s] and command.
+    y : (N, m) array
+        Outputs.
+    quiet : tuple of slice
+        Rests of the command.
+    quanta : (m,) array
+        Resolution of the outputs.
+    motions : tuple of FreeMotion
+        How each output moves in these rests.
+    """
+
+    t: Array
+    y: Array
+    u: Array
+    quiet: tuple[slice, ...]
+    quanta: Array
+    motions: tuple[FreeMotion, ...]
+
+    @classmethod
+    def of(cls, t: Array, y: Array, u: Array, quanta: Array) -> RestedLog:
+        """The log as its rests show it."""
+        quiet, tick = rests(u), float(np.median(np.diff(t)))
+        return cls(
+            t=t, y=y, u=u, quiet=tuple(quiet), motions=tuple(free_motion(column, quiet, tick) for column in y.T),
+            quanta=np.maximum(quanta, [smallest_step(column) for column in y.T]),
+        )  # fmt: skip
+
+    @cached_property
+    def command(self) -> FreeMotion:
+        """The command in its rests: a constant, and noise."""
+        return motionless(self.u, self.quiet, self.motions[0].period)
+
+    @cached_property
+    def level(self) -> float:
+        """Where the command rests."""
+        return float(np.median(np.concatenate([self.u[q] for q in self.quiet])))
+
+
+def rested_answer(log: RestedLog, sine: RestedSine) -> tuple[Tone, Tone, bool]:
     """Answer to one sine, the sine, and whether its swing had not died away.
 
     By its own time, from its rest before to the end of that after, or by the whole log.
 
-    The whole log is exact where rests are too short for the swing to die away, and adds the noise of a longer time.
+    The whole log needs less of the free motion where rests are too short for it to die away, and adds the noise of a
+    longer time.
     """
-    quiet = rests(u)
-    quanta = np.maximum(quanta, [smallest_step(column) for column in y.T])
-    spans = [(sine.before, sine.after), (quiet[0], quiet[-1])]
-    answers = [_ratio(t, y, u, sine, span, quiet, quanta) for span in spans]
+    spans = [(log.quiet.index(sine.before), log.quiet.index(sine.after)), (0, len(log.quiet) - 1)]
+    answers = [_ratio(log, sine, *span) for span in spans]
     best = np.argmin([variance for _, variance, _ in answers], axis=0)
-    pick = np.arange(y.shape[1])
+    pick = np.arange(log.y.shape[1])
     G, variance, left = (np.array(part)[best, pick] for part in zip(*answers, strict=True))
     part = slice(sine.first, sine.last)
-    drive = detect(t[part], u[part], sine.omega)
+    drive = detect(log.t[part], log.u[part], sine.omega)
     line = drive.lines[0, 0]
     # friction and overtones are those of a sine that goes on: so short a one does not show them
-    steady = np.real(np.exp(1j * sine.omega * t[part])[:, None] * (G * line))
-    answer = detect(t[part], steady, sine.omega)
-    noise = _density(t, y, sine.omega, quiet) + quanta**2 / 12
-    late = bool(np.any(left > np.maximum(UNSETTLED * np.abs(G), np.sqrt(variance) / 2)))
+    steady = np.real(np.exp(1j * sine.omega * log.t[part])[:, None] * (G * line))
+    answer = detect(log.t[part], steady, sine.omega)
+    noise = np.array([motion.density(sine.omega) for motion in log.motions]) + log.quanta**2 / 12
+    late = bool(np.any(left > np.maximum(UNSETTLED * np.abs(G), SURE * np.sqrt(variance))))
     return replace(answer, variance=variance * np.abs(line) ** 2, noise=noise), drive, late
 
 
-def _ratio(
-    t: Array, y: Array, u: Array, sine: RestedSine, span: tuple[slice, slice], quiet: Sequence[slice], quanta: Array
-) -> tuple[Complex, Array, Array]:
-    """Response from one rest to the end of another, its variance, and the part of its error by what still moves."""
-    omega, (before, after) = sine.omega, span
-    part = slice(before.stop, after.stop)
+def _ratio(log: RestedLog, sine: RestedSine, before: int, after: int) -> tuple[Complex, Array, Array]:
+    """Response from one rest to the end of another, its variance, and how much of it is continued after the ends."""
+    omega, part = sine.omega, slice(log.quiet[before].stop, log.quiet[after].stop)
     count = part.stop - part.start
-    turn = np.exp(-1j * omega * (t[part] - t[part.start]))
-    further = np.exp(-1j * omega * sine.period)
-    constant = further / (1 - further) * turn[-1]  # the sum of a constant from the next sample on to infinity
-    rest = float(np.median(np.concatenate([u[q] for q in quiet])))
-    level, last = _level(y, before), _level(y, after)
-    U = turn @ (u[part] - rest)
-    Y = turn @ (y[part] - level) + (last - level) * constant
-    left = np.hypot(*(_left(t, y, omega, q, quanta) for q in span))
-    unsure = np.hypot(*(_unsure(y, q) for q in span)) * abs(constant)
-    # rounding repeats from period to period of a sine
-    rounding = quanta**2 / 12 * (count + (sine.last - sine.first) ** 2 / sine.samples)
-    noise, drive = (_density(t, x, omega, quiet) * count for x in (y, u[:, None]))
-    G = Y / U
-    variance = (noise + rounding + unsure**2 + left**2 + np.abs(G) ** 2 * drive) / abs(U) ** 2
-    return G, variance, left / abs(U)
+    turn = np.exp(-1j * omega * sine.period * np.arange(count + 1))
+    turn, end = turn[:-1], complex(turn[-1])
+    U = turn @ (log.u[part] - log.level)
+    drive = log.command.density(omega) * count
+    G = np.empty(len(log.motions), dtype=np.complex128)
+    variance, left = np.empty(G.size), np.empty(G.size)
+    for k, motion in enumerate(log.motions):
+        ends = ((before, -1.0 + 0.0j), (after, end))
+        first, last = (factor * motion.onward(rest, omega) for rest, factor in ends)
+        swings = [motion.onward(rest, omega, swings=True) @ motion.y[rest] for rest, _ in ends]
+        G[k] = (turn @ log.y[part, k] + first @ motion.y[before] + last @ motion.y[after]) / U
+        through, weights = motion.by_rates(omega, ends), np.zeros(log.t.size, dtype=np.complex128)
+        for rest, own in zip(motion.parts, through, strict=True):
+            weights[rest] = own
+        far = float(np.sum(np.abs(weights) ** 2))
+        weights[part] += turn
+        weights[motion.parts[before]] += first
+        weights[motion.parts[after]] += last
+        near = max(0.0, float(np.sum(np.abs(weights) ** 2)) - far)
+        noise = motion.widening * (motion.density(omega) * near + motion.density(motion.fastest) * far)
+        noise += log.quanta[k] ** 2 / 12 * _rounded(log.y[:, k], sine, part, turn, end)
+        variance[k] = (noise + abs(G[k]) ** 2 * drive) / abs(U) ** 2 + (FLOOR * abs(G[k])) ** 2
+        left[k] = np.abs(swings).max() / abs(U)
+    return G, variance, left
 
 
-def _level(y: Array, rest: slice) -> Array:
-    """Where the outputs stand at the end of a rest: their mean over its second half."""
-    return y[(rest.start + rest.stop) // 2 : rest.stop].mean(axis=0)
+def _rounded(y: Array, sine: RestedSine, part: slice, turn: Complex, end: complex) -> float:
+    """Factor on the variance of one reading's rounding that a sum over a part has.
 
-
-def _unsure(y: Array, rest: slice) -> Array:
-    """By how much that differs from one half of this half to the other."""
-    quarter = (rest.stop - rest.start) // 4
-    third, fourth = (y[rest.stop - k * quarter : rest.stop - (k - 1) * quarter].mean(axis=0) for k in (2, 1))
-    return np.abs(third - fourth)
-
-
-def _density(t: Array, y: Array, omega: float, quiet: Sequence[slice]) -> Array:
-    """Power of noise about a frequency, as the variance of white noise that has as much there.
-
-    Of the second halves of all rests, by their Fourier sums there and above, or from the lowest that they hold.
+    Rounding repeats from period to period of a sine. A reading that stands still is off by the same all the time, and
+    by as much in both rests where it is the same in both.
     """
-    powers: list[Array] = []
-    for rest in quiet:
-        part = slice((rest.start + rest.stop) // 2, rest.stop)
-        x = t[part] - t[part].mean()
-        columns = np.column_stack([np.ones_like(x), x])
-        z = y[part] - columns @ np.linalg.lstsq(columns, y[part], rcond=None)[0]
-        lowest = max(omega, 4 * math.pi / float(x[-1] - x[0]))
-        window = np.hanning(x.size)  # else a swing would leak into other frequencies
-        powers += [np.abs((window * np.exp(-1j * w * x)) @ z) ** 2 / (window @ window) for w in lowest * ABOVE]
-    return np.mean(powers, axis=0)
-
-
-def _left(t: Array, y: Array, omega: float, rest: slice, quanta: Array) -> Array:
-    """Size of the Fourier sum of what the outputs still do after a rest, by how their swing dies away within it.
-
-    Sums over successive parts of a swing fall by a common factor. Noise, from third differences, is no swing, and
-    neither is a reading that is half a step off.
-    """
-    length = (rest.stop - rest.start) // PARTS
-    part = slice(rest.stop - PARTS * length, rest.stop)
-    z = y[part] - _level(y, rest)
-    noise = np.mean(np.diff(z, 3, axis=0) ** 2, axis=0) / 20
-    turned = np.exp(-1j * omega * (t[part] - t[part.start]))[:, None] * z
-    sums = np.abs(turned.reshape(PARTS, length, -1).sum(axis=1)) ** 2 - 3 * noise * length
-    sums -= (quanta / 2 * min(length, 2 / omega / float(t[1] - t[0]))) ** 2
-    early, late = (np.maximum(half.mean(axis=0), 0.0) for half in np.split(sums, 2))
-    fall = np.clip(late / np.maximum(early, 1e-300), 1e-12, LINGERS**PARTS) ** (1 / PARTS)
-    return np.sqrt(late) * fall**2 / (1 - fall)
+    count = part.stop - part.start
+    periodic = (sine.last - sine.first) ** 2 / sine.samples
+    ends = y[part.start - SHORTEST // 2 : part.start], y[part.stop - SHORTEST // 2 : part.stop]
+    stuck = [float(np.ptp(z)) == 0 for z in ends]
+    if all(stuck) and ends[0][0] == ends[1][0]:
+        return count + periodic + abs((1 - end) / (1 - turn[1])) ** 2
+    return count + periodic + sum(stuck) / abs(1 - turn[1]) ** 2

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from upright.errors import NotIdentifiable
 from upright.identification.frequency.detection import PER_PERIOD, Tone, detect, overtones, settled
 from upright.identification.frequency.response import FrequencyResponse
-from upright.identification.frequency.rested import rested_answer, rested_sines
+from upright.identification.frequency.rested import RestedLog, rested_answer, rested_sines
 from upright.records import Record
 from upright.signals.steps import smallest_step
 
@@ -119,9 +119,10 @@ def stepped_response(
     for r in records:
         y, u = np.column_stack([r[n] for n in outputs]), r[command]
         step = smallest_step(u)
-        for short in rested_sines(r.t, u):
-            answer, drive, late = rested_answer(r.t, y, u, short, quanta)
-            points.append(_Measured(y=answer, u=drive, late=late, lasting=math.inf, rested=True))
+        if short_ones := rested_sines(r.t, u):
+            log = RestedLog.of(r.t, y, u, quanta)
+            for answer, drive, late in (rested_answer(log, short) for short in short_ones):
+                points.append(_Measured(y=answer, u=drive, late=late, lasting=math.inf, rested=True))
         for stretch in sines_in(r.t, u):
             if stretch.samples < PER_PERIOD + 0.5:
                 fast.append(stretch.omega)
@@ -262,8 +263,8 @@ def _notes(points: Sequence[_Measured], fast: Sequence[float]) -> list[str]:
         )
     if rested := [p.y.omega for p in points if p.late and p.rested]:
         notes.append(
-            f"Not settled at {_listed(rested)} rad/s: what still swings at the end of a rest counts as error "
-            "there. Rest longer between the sines, or hold each for more periods."
+            f"Not settled at {_listed(rested)} rad/s: what still swings at the end of a rest is continued "
+            "there as it decayed before. Rest longer between the sines, or hold each for more periods."
         )
     if fast:
         notes.append(f"Left out {_listed(sorted(fast))} rad/s: fewer than {PER_PERIOD} samples per period.")
