@@ -187,6 +187,17 @@ def test_a_command_that_was_measured_holds_noise_and_moves_no_frequency() -> Non
     assert np.abs(found.drive) == pytest.approx(np.geomspace(0.2, 1.0, 10), rel=0.03)  # of 30 samples, 5 % each
 
 
+def test_noise_of_a_command_in_its_rests_is_no_sine() -> None:
+    u = command(FREQUENCIES, periods=2, pause=6.0)
+    r = log(u)
+    for seed in range(2):
+        noise = 0.005 * np.random.default_rng(seed).normal(size=u.size)
+        found = measured(r.replace(signals={**r.signals, "u": u + noise}))
+        assert found.omega == pytest.approx(FREQUENCIES, rel=3e-3)
+        assert not any(note.startswith("Left out") for note in found.notes)
+        assert np.mean(beyond(found) < 3) >= 0.7  # of ten cases at 95 %, fewer in 1 of 1000
+
+
 def test_where_a_sine_grows_and_dies_away_it_is_not_measured() -> None:
     """In forty periods of a sine that grows in ten and dies away in ten, about twenty are full."""
     omega, n = 20.0, round(40 * 2 * math.pi / 20.0 / DT)

@@ -57,6 +57,11 @@ class RestedSine:
         """Of a period."""
         return 2 * math.pi / self.omega / self.period
 
+    @property
+    def periods(self) -> float:
+        """That it lasts."""
+        return (self.last - self.first) / self.samples
+
 
 def rests(u: Array) -> list[slice]:
     """Where a command rests: on its median, which a sine only passes by."""

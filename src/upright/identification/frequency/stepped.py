@@ -40,6 +40,8 @@ DRIFTS = 0.5
 """Share of the step to the next frequency by which a period changes within a stretch of a sweep; 0 in a sine."""
 UNSETTLED = 0.02
 """Share of a line that its transient may still be before the response says so."""
+FEW, SURELY = 30, 0.95
+"""Samples of which noise looks like a sine now and then, and the share that one has to explain of so few."""
 LEAST = 12
 """Samples in the least part of a sine that is looked at by itself: one period, or several of a fast one."""
 ALIKE = 0.6
@@ -124,6 +126,8 @@ def stepped_response(
             for answer, drive, late in (rested_answer(log, short) for short in short_ones):
                 points.append(_Measured(y=answer, u=drive, late=late, lasting=math.inf, rested=True))
         for stretch in sines_in(r.t, u):
+            if any(x.first < stretch.last and stretch.first < x.last and x.periods < 2.6 for x in short_ones):
+                continue  # noise about zero makes a third crossing of two periods
             if stretch.samples < PER_PERIOD + 0.5:
                 fast.append(stretch.omega)
             else:
@@ -354,7 +358,8 @@ def _between(t: Array, u: Array, at: NDArray[np.int64], times: Array) -> list[He
             a, b = i + a, i + b
             part = slice(int(at[a]), int(at[b]))
             omega, explained = _sine(t[part], u[part], 2 * math.pi * (b - a) / (times[b] - times[a]))
-            if explained > ALIKE:
+            count = part.stop - part.start
+            if count >= LEAST and explained > (ALIKE if count > FEW else SURELY):
                 out.append(HeldSine(first=part.start, last=part.stop, omega=omega, crossings=times[a : b + 1]))
         i = j
     return out
