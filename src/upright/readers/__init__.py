@@ -12,7 +12,7 @@ from upright.errors import BadInput
 from upright.readers.inspection import Inspection, inspect_column, inspect_record
 from upright.readers.reader import READERS, Reader
 from upright.readers.source import Source, load
-from upright.readers.wrapped import counted_on, jumps_as_an_angle, turned_on, unwrapped
+from upright.readers.wrapped import counted_on, may_turn_on, turned_on, unwrapped
 from upright.records import PathLike, Record
 from upright.records.columns import ANGLES
 
@@ -54,8 +54,8 @@ def _unwrapped(record: Record) -> Record:
     signals, notes = dict(record.signals), list[str]()
     for name, values in record.signals.items():
         signals[name], bits, times = unwrapped(values)
-        if not times and jumps_as_an_angle(values):
-            unit = record.units[name] or inspect_column(record, name).guess
+        if not times:
+            unit = record.units[name] or (inspect_column(record, name).guess if may_turn_on(values) else "")
             signals[name], times = turned_on(values, unit) if unit in ANGLES else (values, 0)
         if times:
             notes.append(counted_on(name, bits, times))

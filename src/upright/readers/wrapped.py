@@ -66,9 +66,11 @@ FEWEST_PLACES = 4
 """Different readings of an angle: an encoder whose zero is upright has few while a loop balances."""
 
 
-def jumps_as_an_angle(values: Array) -> bool:
-    """Whether readings (N,) go at once through most of what they go through at all."""
-    return float(np.abs(np.diff(values)).max(initial=0.0)) > (1 - SWIFT) * float(np.ptp(values)) > 0
+def may_turn_on(values: Array) -> bool:
+    """Whether readings (N,) go through a turn in rad or deg, most of it at once; their unit has to say the rest."""
+    swept, jump = float(np.ptp(values)), float(np.abs(np.diff(values)).max(initial=0.0))
+    wholes = (2 * np.pi / ANGLES[unit] for unit in ("rad", "deg"))
+    return any(FULL * whole <= swept <= (1 + 2 * SLACK) * whole and jump > (1 - SWIFT) * whole for whole in wholes)
 
 
 def _without_jumps(values: Array, whole: float, *, fewest: int = FEWEST) -> tuple[Array, int]:
